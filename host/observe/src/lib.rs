@@ -1,5 +1,9 @@
 //! What every stage reports, without knowing who reads it: its progress to an [`Observer`], its errors
-//! [with their causes](with_causes).
+//! [with their causes](with_causes), and text of files as terminals [may show it](visible).
+
+mod text;
+
+pub use text::{visible, visible_line};
 
 /// Watches a stage at work. Calls may come from several threads.
 pub trait Observer: Sync {

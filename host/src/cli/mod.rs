@@ -11,7 +11,7 @@ mod output;
 mod printing;
 
 use std::ffi::OsString;
-use std::io::{self, Write as _};
+use std::io::Write as _;
 use std::process::ExitCode;
 
 use anyhow::Result;
@@ -20,7 +20,8 @@ use clap::{CommandFactory as _, Parser};
 
 use commands::{Command, preset, queue};
 use console::progress::Progress;
-use console::{advice, chain, closed_pipe, permission};
+use console::{advice, chain, closed_pipe, permission, say, stderr};
+use observe::visible_line;
 
 /// Print materials instead of colours on the ALPS MD-5500 (Oki DP-5000).
 #[derive(Parser)]
@@ -55,12 +56,18 @@ pub fn main() -> ExitCode {
         }
     }));
     let args = match preset::expand(std::env::args_os().collect(), &Args::command()) {
-        Ok(args) => match Args::try_parse_from(&args) {
-            Err(error) if error.kind() == ErrorKind::UnknownArgument => {
-                Args::parse_from(negative_values(args))
+        Ok(args) => {
+            let parsed = match Args::try_parse_from(&args) {
+                Err(error) if error.kind() == ErrorKind::UnknownArgument => {
+                    Args::try_parse_from(negative_values(args))
+                }
+                parsed => parsed,
+            };
+            match parsed {
+                Ok(args) => args,
+                Err(error) => return not_parsed(&error),
             }
-            parsed => parsed.unwrap_or_else(|error| error.exit()),
-        },
+        }
         Err(error) => return failed(&error),
     };
     match &args.command {
@@ -79,18 +86,36 @@ pub fn main() -> ExitCode {
     }
 }
 
+/// Says what is wrong with the arguments, or shows the help that was asked for.
+fn not_parsed(error: &clap::Error) -> ExitCode {
+    let acts = |argument: OsString| {
+        let text = argument.to_string_lossy().into_owned();
+        visible_line(&text) != text
+    };
+    // Clap quotes arguments as they are; only without its colours can they be told from its own text. A closed pipe is
+    // success.
+    let _ = match std::env::args_os().any(acts) {
+        true => write!(stderr(), "{}", error.render()),
+        false => error.print(),
+    };
+    ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(USAGE))
+}
+
+/// Exit code for wrong arguments.
+const USAGE: u8 = 2;
+
 /// Says why the program fails.
 fn failed(error: &anyhow::Error) -> ExitCode {
-    const USAGE: u8 = 2;
     if let Some(usage) = error.downcast_ref::<clap::Error>() {
         // Standard error is all there is to say it on.
         let _ = usage.print();
         return ExitCode::from(USAGE);
     }
     let advice = advice::of(error).map_or_else(String::new, |advice| format!("; {advice}"));
-    let _ = writeln!(io::stderr(), "foilpress: {}{advice}", chain(error));
+    say(&format!("foilpress: {}{advice}", chain(error)));
     if permission::is_missing(error) {
-        let _ = write!(io::stderr(), "\n{}", permission::how_to_give());
+        say("");
+        permission::how_to_give().lines().for_each(say);
     }
     ExitCode::FAILURE
 }

@@ -6,10 +6,11 @@
 //! file in the same format.
 
 use std::fs;
-use std::io::{self, Read as _, Write as _};
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use crate::cli::console::say;
 use anyhow::{Context, Result, bail};
 use appearance::edit;
 use art::process;
@@ -323,7 +324,8 @@ pub fn remove_on_interrupt() -> Result<()> {
         }
         let farewell = FAREWELL.lock().unwrap_or_else(PoisonError::into_inner);
         let text = farewell.as_deref().unwrap_or("nothing unfinished is left behind");
-        let _ = writeln!(io::stderr(), "\nfoilpress: interrupted; {text}");
+        say("");
+        say(&format!("foilpress: interrupted; {text}"));
         std::process::exit(130);
     })
     .context("cannot watch for Ctrl-C")

@@ -13,7 +13,7 @@ use protocol::link::message::Fault;
 use protocol::status::Complaint;
 
 use device::questions::status::Status;
-use observe::Observer;
+use observe::{Observer, visible_line};
 
 /// Why a printer does not print, or soon will not.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -124,7 +124,8 @@ impl<W: Write> Messages<W> {
 
     fn line(&self, keyword: &str, text: &str) {
         // A message is one line. If nobody reads it, the job goes on.
-        let text: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+        let text = text.replace('\n', " ");
+        let text = visible_line(&text);
         // Filter and backend share a pipe: what is written at once, up to a page, is not torn apart by the other's lines.
         let line = format!("{keyword}: {text}\n");
         self.with(|state| {

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::cli::commands::bridge::{Found, ask};
 use crate::cli::commands::resume::{as_json, line};
-use crate::cli::console::{chain, permission, show};
+use crate::cli::console::{chain, permission, show, stdout};
 use device::connection::find::{self, Candidate};
 use device::connection::{Address, OpenError};
 use device::flash::{drive, usb};
@@ -45,8 +45,7 @@ struct Visit<W> {
 
 /// Runs `doctor`. Fails if something prevents printing.
 pub fn run(args: &Args) -> Result<()> {
-    let out: Box<dyn std::io::Write> =
-        if args.json { Box::new(std::io::sink()) } else { Box::new(std::io::stdout().lock()) };
+    let out: Box<dyn std::io::Write> = if args.json { Box::new(std::io::sink()) } else { Box::new(stdout()) };
     let found =
         json!({ "jobs_folder": null, "unfinished_jobs": [], "boards_in_boot_loader": 0, "bridges": [] });
     let mut visit = Visit { out, troubles: Vec::new(), found, forbidden: false };

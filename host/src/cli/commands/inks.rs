@@ -12,7 +12,6 @@ mod share;
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -20,7 +19,7 @@ use inks::{Entry, InkSet, Library, Origins, Provenance, Severity, Source, Stack}
 use protocol::ink::Ink;
 use serde::Serialize;
 
-use crate::cli::console::{closed_pipe, show};
+use crate::cli::console::{closed_pipe, draw, show, stdout};
 use crate::cli::output::Staged;
 use crate::libraries;
 use appearance::brdf::plot;
@@ -159,11 +158,12 @@ pub fn run(args: Args, observer: &dyn Observer) -> anyhow::Result<()> {
             (list(&libraries::given(library.as_deref())?, inks, json)?, Ok(()))
         }
         What::Show { stack, library, figures, plot } => {
-            let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+            let colour = stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
             let library = libraries::given(library.as_deref())?;
             let entry = &*find(&library, &stack)?;
-            let mut text = describe(&library, entry, figures);
-            text.push_str(&plot::terminal(&entry.curve, colour));
+            show(&describe(&library, entry, figures))?;
+            draw(&plot::terminal(&entry.curve, colour))?;
+            let mut text = String::new();
             if let Some(file) = &plot {
                 let title =
                     format!("{}: {} ({})", entry.stack, library.words(&entry.stack), entry.provenance.word());

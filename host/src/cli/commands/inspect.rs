@@ -8,7 +8,7 @@ use clap::Args as ClapArgs;
 
 use serde::Serialize;
 
-use crate::cli::console::read_job;
+use crate::cli::console::{read_job, stdout};
 use crate::cli::output::{Kind, Staged};
 use device::forms::streams;
 use observe::Observer;
@@ -49,7 +49,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let job = read_job(&args.job)?;
     let places = sheets(&job);
     let several = places.len() > 1;
-    let mut out = std::io::stdout().lock();
+    let mut out = stdout();
     let staged = args.passes.as_deref().map(|folder| Staged::folder(folder, Kind::Pictures)).transpose()?;
     let inside = staged.as_ref().map(Staged::create).transpose()?;
     let mut summaries = Vec::new();

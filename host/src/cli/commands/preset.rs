@@ -4,14 +4,13 @@
 //! so it can hold any option of a command, its options are checked by the same rules, and typed options override it.
 
 use std::ffi::OsString;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
 use serde::{Deserialize, Serialize};
 
-use crate::cli::console::{chain, show, usage};
+use crate::cli::console::{chain, say, show, usage};
 use crate::folders;
 use files::durable::{self, Access};
 use files::{read_toml, write_toml};
@@ -328,7 +327,7 @@ pub fn expand(args: Vec<OsString>, program: &clap::Command) -> Result<Vec<OsStri
             None => words.join(" "),
             Some(_) => "does not fit this command and is ignored".into(),
         };
-        let _ = writeln!(std::io::stderr(), "note: preset `{name}`: {what}");
+        say(&format!("note: preset `{name}`: {what}"));
     }
     Ok(if refused.is_none() { all } else { args })
 }

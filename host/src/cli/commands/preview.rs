@@ -22,7 +22,7 @@ use self::wear::{Told, WearArgs};
 use crate::cli::arguments::choice::whole;
 use crate::cli::arguments::document_dots::DotsArgs;
 use crate::cli::commands::preset::PresetArg;
-use crate::cli::console::usage;
+use crate::cli::console::{stdout, usage};
 use crate::cli::output::Staged;
 
 /// What is written.
@@ -162,7 +162,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     };
     let bytes = fs::metadata(staged.path()).map_or(0, |found| found.len());
     staged.commit()?;
-    let mut out = std::io::stdout().lock();
+    let mut out = stdout();
     if args.json {
         let size_mm = shown.size().map(|side| side * 1000.0);
         let report = json!({
@@ -196,7 +196,7 @@ fn write_glb(args: &Args, glb: &Glb, shown: &PreviewSubject, staged: Staged) -> 
     fs::write(staged.path(), &glb.bytes)
         .with_context(|| format!("cannot write {}", args.output.display()))?;
     staged.commit()?;
-    let mut out = std::io::stdout().lock();
+    let mut out = stdout();
     let Glb { bytes, texels, distance, worst } = glb;
     if args.json {
         let size_mm = shown.size().map(|side| side * 1000.0);

@@ -12,7 +12,7 @@ use clap::{Args as ClapArgs, Subcommand};
 use inks::Library;
 use serde_json::json;
 
-use crate::cli::console::{chain, show};
+use crate::cli::console::{chain, show, stderr, stdout};
 use crate::queue::call::{Call, Exit};
 use crate::queue::install::{self, Places};
 use crate::queue::messages::Messages;
@@ -238,7 +238,7 @@ fn list(json: bool) -> Result<()> {
             found.push((name, device, state));
         }
     }
-    let mut out = io::stdout().lock();
+    let mut out = stdout();
     if json {
         let queue = |(name, device, state): &(String, String, Vec<String>)| json!({ "name": name, "device": device, "state": state });
         let queues: Vec<_> = found.iter().map(queue).collect();
@@ -272,7 +272,7 @@ pub fn backend(args: &Conventional) -> ExitCode {
             Err(_) => ExitCode::from(Exit::Failed as u8),
         };
     }
-    let messages = Messages::new(io::stderr());
+    let messages = Messages::new(stderr());
     // The print system asks a job to end by SIGTERM.
     if let Err(error) = ctrlc::set_handler(|| STOP.store(true, Ordering::SeqCst)) {
         messages.debug(&format!("cannot watch for signals: {}", with_causes(&error)));
@@ -293,7 +293,7 @@ pub fn backend(args: &Conventional) -> ExitCode {
 
 /// The filter: `job user title copies options [file]`, jobs to standard output.
 pub fn filter(args: &Conventional) -> ExitCode {
-    let messages = Messages::of_filter(io::stderr());
+    let messages = Messages::of_filter(stderr());
     // A cancelled job leaves neither folders nor a Ghostscript behind.
     if let Err(error) = crate::cli::output::remove_on_interrupt() {
         messages.debug(&chain(&error));
@@ -321,6 +321,7 @@ fn wait_until_read() {
     let end = Instant::now() + HEARD;
     // A pipe says at either end how much is in it.
     #[cfg(target_os = "linux")]
+    #[expect(clippy::disallowed_methods, reason = "nothing is written")]
     while Instant::now() < end && rustix::io::ioctl_fionread(io::stderr()).is_ok_and(|unread| unread > 0) {
         std::thread::sleep(Duration::from_millis(20));
     }
@@ -336,6 +337,7 @@ fn filtered(arguments: &[OsString], observer: &dyn Observer) -> Result<usize> {
     // Its defaults are the queue's; without it the program's own apply.
     let description = std::env::var_os("PPD").and_then(|path| std::fs::read_to_string(path).ok());
     let choices = Choices::read(&options::parse(&asked.to_string_lossy()), description.as_deref())?;
+    #[expect(clippy::disallowed_methods, reason = "jobs are bytes, and the print system reads them")]
     let mut out = io::BufWriter::with_capacity(1 << 18, io::stdout());
     let library = Library::builtin();
     Ok(match &file {

@@ -8,8 +8,8 @@ use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
 
 use crate::cli::commands::bridge;
-use crate::cli::console::show;
 use crate::cli::console::terminal::agreed;
+use crate::cli::console::{show, stdout};
 use crate::cli::printing::deliver::{are_copies, go_on};
 use device::connection::Address;
 use device::questions::query::Query;
@@ -93,7 +93,7 @@ pub fn resume(args: &Resume, observer: &dyn Observer) -> Result<()> {
             observer.note(NONE_YET);
         }
         damaged.iter().for_each(|(job, error)| observer.note(&format!("job {}: {error}", number_of(*job))));
-        let mut out = std::io::stdout().lock();
+        let mut out = stdout();
         for entry in entries {
             writeln!(out, "{}", line(&entry))?;
         }
@@ -191,7 +191,7 @@ fn cancel_plain(to: Option<&Address>) -> Result<()> {
     let address = bridge::named_or_only(to)?;
     let mut link = address.open()?;
     let progress = Query::new(&mut *link, bridge::PATIENCE)?.cancel(PLAIN, bridge::PATIENCE)?;
-    let mut out = std::io::stdout().lock();
+    let mut out = stdout();
     writeln!(out, "{}", bridge::doing(&progress))?;
     Ok(())
 }

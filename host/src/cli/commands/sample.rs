@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 
+use crate::cli::console::stdout;
 use crate::cli::output::{Kind, Staged};
 use appearance::document;
 use appearance::sample::{SAMPLES, Sample};
@@ -25,7 +26,7 @@ pub struct Args {
 
 /// Lists the samples, or draws one and writes its maps.
 pub fn run(args: Args) -> Result<()> {
-    let mut out = std::io::stdout().lock();
+    let mut out = stdout();
     if args.name == "list" {
         if args.output.is_some() {
             bail!("`sample list` writes no files; name a sample to use -o");

@@ -1,13 +1,16 @@
-//! What every command does the same way: results to standard output, jobs from files, errors as text.
+//! What every command does the same way: results, notes and questions on the terminal, jobs from files, errors as text.
 
 pub mod advice;
 pub mod permission;
 pub mod progress;
 pub mod terminal;
+mod visible;
+
+pub use visible::{draw, say, show, stderr, stdout};
 
 use std::fmt;
 use std::fs::File;
-use std::io::{self, Read as _, Write as _};
+use std::io::{self, Read as _};
 use std::path::Path;
 
 use anyhow::{Context, Error, Result, bail};
@@ -17,7 +20,7 @@ use device::connection::OpenError;
 use device::deliver::Failure;
 use device::flash::FlashError;
 use device::questions::query::QueryError;
-use observe::{Observer, with_causes};
+use observe::{Observer, visible, with_causes};
 use press::simulate;
 use sheet::Sheet;
 
@@ -31,12 +34,7 @@ pub fn chain(error: &anyhow::Error) -> String {
 
 /// A mistake in the arguments that clap does not see by itself. It ends like those that clap sees, with exit code 2.
 pub fn usage(said: impl fmt::Display) -> Error {
-    clap::Error::raw(ErrorKind::ValueValidation, format!("{said}\n")).into()
-}
-
-/// Writes a result to standard output.
-pub fn show(text: &str) -> Result<()> {
-    io::stdout().lock().write_all(text.as_bytes()).context("cannot write to standard output")
+    clap::Error::raw(ErrorKind::ValueValidation, format!("{}\n", visible(&said.to_string()))).into()
 }
 
 /// Reads a whole job from a file.

@@ -1,20 +1,15 @@
 //! Progress bars on the terminal: one at a time, with the time left, and a line for what is done.
 
-use std::io::{self, Write as _};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use observe::Observer;
+use super::say;
+use observe::{Observer, visible_line};
 
 /// Stages shorter than this leave no line behind.
 const WORTH_A_LINE: Duration = Duration::from_millis(50);
-
-/// Writes a line to standard error. A closed standard error does not stop the work.
-fn say(line: std::fmt::Arguments<'_>) {
-    let _ = writeln!(io::stderr(), "{line}");
-}
 
 /// Draws on standard error. Without a terminal it writes only notes and finished stages, one on a line.
 pub struct Progress {
@@ -43,8 +38,9 @@ impl Observer for Progress {
         if let Ok(style) = ProgressStyle::with_template("{msg:>30} {wide_bar} {percent:>3} %  {eta} left") {
             bar.set_style(style);
         }
-        bar.set_message(stage.to_owned());
-        self.with(|current| *current = Some((bar, stage.to_owned(), Instant::now())));
+        let stage = visible_line(stage).into_owned();
+        bar.set_message(stage.clone());
+        self.with(|current| *current = Some((bar, stage, Instant::now())));
     }
 
     fn advance(&self, steps: u64) {
@@ -60,15 +56,15 @@ impl Observer for Progress {
             bar.finish_and_clear();
             let took = start.elapsed();
             if took >= WORTH_A_LINE {
-                say(format_args!("{stage:>30}  {:.1} s", took.as_secs_f64()));
+                say(&format!("{stage:>30}  {:.1} s", took.as_secs_f64()));
             }
         }
     }
 
     fn note(&self, text: &str) {
         self.with(|current| match current {
-            Some((bar, ..)) => bar.suspend(|| say(format_args!("note: {text}"))),
-            None => say(format_args!("note: {text}")),
+            Some((bar, ..)) => bar.suspend(|| say(&format!("note: {text}"))),
+            None => say(&format!("note: {text}")),
         });
     }
 }

@@ -9,6 +9,7 @@ use indicatif::HumanBytes;
 use protocol::ink::Ink;
 use protocol::link::message::JobKind;
 
+use super::stderr;
 use crate::cli::output;
 use device::deliver::{Caller, Cartridges, News, Question};
 use device::forms::PassPlace;
@@ -166,12 +167,12 @@ impl Caller for Terminal<'_> {
 
 /// Asks the person at the terminal; without one the answer is no.
 pub fn agreed(question: &str) -> bool {
-    if !io::stdin().is_terminal() || !io::stderr().is_terminal() {
+    if !io::stdin().is_terminal() || !stderr().is_terminal() {
         return false;
     }
     let mut answer = String::new();
     let asked =
-        write!(io::stderr(), "{question} [y/N] ").and_then(|()| io::stdin().lock().read_line(&mut answer));
+        write!(stderr(), "{question} [y/N] ").and_then(|()| io::stdin().lock().read_line(&mut answer));
     asked.is_ok() && matches!(answer.trim(), "y" | "Y" | "yes")
 }
 

@@ -8,8 +8,8 @@ use clap::Args;
 
 use crate::cli::arguments::choice::whole;
 use crate::cli::commands::bridge::shelf_text;
-use crate::cli::console::show;
 use crate::cli::console::terminal::{Terminal, cartridges_needed, cartridges_text, size_text};
+use crate::cli::console::{show, stderr};
 use crate::cli::output::{self, Staged};
 use device::connection::{Address, Destination};
 use device::deliver::{Delivery, Ended, Failure, Job, Packed, find_cartridges};
@@ -309,7 +309,7 @@ fn confirm(name: &str) -> Result<()> {
     if !io::stdin().is_terminal() {
         bail!("{name} is not sent: there is no terminal to confirm the plan on; review it, then pass --yes");
     }
-    write!(io::stderr(), "Send it? [y/N] ")?;
+    write!(stderr(), "Send it? [y/N] ")?;
     let mut answer = String::new();
     io::stdin().lock().read_line(&mut answer)?;
     match answer.trim().to_ascii_lowercase().as_str() {
@@ -320,7 +320,7 @@ fn confirm(name: &str) -> Result<()> {
 
 /// Waits for Enter between two sheets; `false` when nobody is there to press it.
 fn next_sheet(done: u16, copies: u16) -> Result<bool> {
-    write!(io::stderr(), "Sheet {done} of {copies} is sent. Load the next one and press Enter: ")?;
+    write!(stderr(), "Sheet {done} of {copies} is sent. Load the next one and press Enter: ")?;
     let mut answer = String::new();
     Ok(io::stdin().lock().read_line(&mut answer)? > 0)
 }

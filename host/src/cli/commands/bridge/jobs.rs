@@ -9,7 +9,7 @@ use protocol::link::message::JobKind;
 use serde_json::json;
 
 use super::found::{PATIENCE, named_or_only, shelf_text};
-use crate::cli::console::show;
+use crate::cli::console::{show, stdout};
 use device::connection::Address;
 use device::questions::query::{Query, Shelf, Stored};
 use device::transit::journal::fresh_number;
@@ -63,7 +63,7 @@ pub fn run(args: &Args) -> Result<()> {
         return show(&format!("job {stored:08x} is deleted from the bridge\n"));
     }
     let shelf = query.shelf(PATIENCE)?;
-    let mut out = std::io::stdout().lock();
+    let mut out = stdout();
     if args.json {
         writeln!(out, "{}", serde_json::to_string_pretty(&as_json(&shelf))?)?;
     } else {

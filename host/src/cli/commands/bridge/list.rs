@@ -7,8 +7,8 @@ use clap::Args as ClapArgs;
 use serde_json::json;
 
 use super::found::{Found, ask, doing, newer_firmware};
-use crate::cli::console::chain;
 use crate::cli::console::permission;
+use crate::cli::console::{chain, stdout};
 use device::connection::find::{self, Candidate};
 use device::flash::{drive, usb};
 use device::questions::query::is_alps;
@@ -37,7 +37,7 @@ pub fn run(args: &Args) -> Result<()> {
         })
         .collect();
     let boards = usb::boards().map_or(0, |boards| boards.len()).max(drive::find().len());
-    let mut out = std::io::stdout().lock();
+    let mut out = stdout();
     if args.json {
         let bridges: Vec<_> = asked.iter().map(|(candidate, found)| as_json(candidate, found)).collect();
         let others: Vec<_> = survey

@@ -8,6 +8,7 @@ use clap::Args as ClapArgs;
 use serde_json::json;
 
 use super::found::{PATIENCE, named_or_only};
+use crate::cli::console::stdout;
 use device::connection::Address;
 use device::flash::installed;
 use device::questions::log;
@@ -51,7 +52,7 @@ pub fn run(args: &Args) -> Result<()> {
     let program = std::fs::read(&path).with_context(what)?;
     let raw = log::read(&mut query, PATIENCE)?;
     let log = log::decode(&raw, &program)?;
-    let mut out = std::io::stdout().lock();
+    let mut out = stdout();
     if args.json {
         for entry in &log.entries {
             writeln!(out, "{}", serde_json::to_string(entry)?)?;

@@ -7,6 +7,7 @@ use clap::Args as ClapArgs;
 
 use super::found::{Found, named_or_only};
 use super::watch;
+use crate::cli::console::stdout;
 use device::connection::Address;
 use device::deliver::ask::Negotiate;
 
@@ -40,7 +41,7 @@ pub fn run(args: &Args) -> Result<()> {
         return watch::run(&address, args.json, negotiate);
     }
     let found = Found::ask(&address, negotiate)?;
-    let mut out = std::io::stdout().lock();
+    let mut out = stdout();
     if args.json {
         writeln!(out, "{}", serde_json::to_string_pretty(&found.json())?)?;
     } else {

@@ -1,6 +1,6 @@
 //! `foilpress bridge test`: test the wiring with a loop-back plug or a meter.
 
-use std::io::{IsTerminal as _, Write as _};
+use std::io::Write as _;
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -10,6 +10,7 @@ use protocol::link::message::Lines;
 use serde_json::json;
 
 use super::found::{PATIENCE, named_or_only};
+use crate::cli::console::{say, stderr, stdout};
 use crate::cli::output::say_on_interrupt;
 use device::connection::Address;
 use device::questions::query::{Query, QueryError};
@@ -75,7 +76,7 @@ fn test(query: &mut Query<'_>, json: bool) -> Result<()> {
 
 /// Tests the plug in each of its positions; without a terminal, only in its present one, since nobody can be asked to move it.
 fn try_positions(probe: &mut dyn FnMut(Levels) -> Result<Lines, QueryError>) -> Result<Vec<Seen>> {
-    let attended = std::io::stderr().is_terminal();
+    let attended = stderr().is_terminal();
     let mut seen: Vec<Seen> = Vec::new();
     let mut asked = None;
     while let Some(next) = Plug::ALL.into_iter().find(|plug| seen.iter().all(|seen| seen.plug != *plug)) {
@@ -85,17 +86,17 @@ fn try_positions(probe: &mut dyn FnMut(Levels) -> Result<Lines, QueryError>) -> 
                 // Only if the plug was not moved meanwhile.
                 if wiring::find(probe)? == Some(plug) {
                     let words = if found.is_good() { "good" } else { "faulty" };
-                    eprintln!("position {}: {words}", plug.number());
+                    say(&format!("position {}: {words}", plug.number()));
                     seen.push(found);
                 }
             }
             _ if !attended => break,
             _ => {
                 if asked.replace(next) != Some(next) {
-                    eprintln!(
+                    say(&format!(
                         "put the loop-back plug in position {} (in place of the printer)",
                         next.number()
-                    );
+                    ));
                 }
                 sleep(POLL);
             }
@@ -105,7 +106,7 @@ fn try_positions(probe: &mut dyn FnMut(Levels) -> Result<Lines, QueryError>) -> 
 }
 
 fn report(verdict: &Verdict, tried: &[u8], json: bool) -> Result<()> {
-    let mut out = std::io::stdout().lock();
+    let mut out = stdout();
     if json {
         let (faults, astray) = match verdict {
             Verdict::Good => (vec![], vec![]),
@@ -143,7 +144,7 @@ fn walk(query: &mut Query<'_>) -> Result<()> {
         bail!("a device that is switched on is connected; take the cable off the printer first");
     }
     say_on_interrupt("the lines stay as they are until the next job begins");
-    let mut out = std::io::stdout().lock();
+    let mut out = stdout();
     writeln!(out, "at rest: nStrobe, nAutoFd, nInit high; nSelectIn and the data lines low")?;
     for (bit, line) in OUTPUTS.iter().enumerate() {
         let levels = Levels(Levels::REST.0 ^ 1 << bit);

@@ -1,6 +1,6 @@
 //! `foilpress bridge status --watch`: the status, refreshed until the program is interrupted.
 
-use std::io::{IsTerminal as _, Write as _};
+use std::io::Write as _;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -9,12 +9,13 @@ use console::Term;
 use serde_json::json;
 
 use super::found::{Found, PATIENCE, PRINTER_PATIENCE};
-use crate::cli::console::chain;
+use crate::cli::console::{chain, draw, stdout};
 use device::connection::Address;
 use device::connection::transport::Transport;
 use device::deliver::ask::{self, Negotiate};
 use device::printers::Printers;
 use device::questions::query::{Query, Reply};
+use observe::visible;
 
 /// Time between two questions to the bridge.
 const POLL: Duration = Duration::from_secs(1);
@@ -41,11 +42,11 @@ impl Screen {
         if text == self.shown {
             return Ok(());
         }
-        let mut out = std::io::stdout().lock();
+        let mut out = stdout();
         if self.terminal && !self.shown.is_empty() {
             // Moves up to the first line and erases everything below.
             let columns = usize::from(Term::stdout().size().1);
-            write!(out, "\x1b[{}F\x1b[J", rows(&self.shown, columns))?;
+            draw(&format!("\x1b[{}F\x1b[J", rows(&visible(&self.shown), columns)))?;
         } else if !self.json && !self.shown.is_empty() {
             writeln!(out)?;
         }
@@ -76,8 +77,7 @@ impl Screen {
 /// Shows bridge and printer for ever. Waits for a bridge that goes away, once it has been connected.
 pub fn run(address: &Address, json: bool, negotiate: Negotiate) -> Result<()> {
     let printers = Printers::of_system()?;
-    let mut screen =
-        Screen { json, terminal: std::io::stdout().is_terminal() && !json, shown: String::new() };
+    let mut screen = Screen { json, terminal: stdout().is_terminal() && !json, shown: String::new() };
     let mut been = false;
     loop {
         let met = match address.open() {
