@@ -7,6 +7,7 @@
 mod arguments;
 mod commands;
 mod console;
+mod help;
 mod output;
 mod printing;
 
@@ -16,7 +17,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::error::ErrorKind;
-use clap::{CommandFactory as _, Parser};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 
 use commands::{Command, preset, queue};
 use console::progress::Progress;
@@ -30,6 +31,12 @@ use observe::visible_line;
     version,
     after_help = "Examples:\n  \
         foilpress print sample:leaf\n  \
+        foilpress layers white.png gold.png black.png --finish artwork\n  \
+        foilpress send job.rgl --to serial:/dev/ttyACM0\n\n\
+        The steps of `print`, one command each:\n  \
+        factor, map, halftone, layout, separate, encode, simulate",
+    after_long_help = "Examples:\n  \
+        foilpress print sample:leaf\n  \
         foilpress print my-material/ --size 120x90mm --bases 8 --to file:job.rgl\n  \
         foilpress layers white.png gold.png black.png --finish artwork\n  \
         foilpress inks show MS+C\n  \
@@ -40,7 +47,7 @@ use observe::visible_line;
 )]
 struct Args {
     /// Show no progress on standard error, only notes and errors
-    #[arg(short, long, global = true, display_order = 900)]
+    #[arg(short, long, global = true, display_order = 900, help_heading = help::GENERAL)]
     quiet: bool,
     #[command(subcommand)]
     command: Command,
@@ -55,11 +62,13 @@ pub fn main() -> ExitCode {
             usual(panic);
         }
     }));
-    let args = match preset::expand(std::env::args_os().collect(), &Args::command()) {
+    let typed: Vec<OsString> = std::env::args_os().collect();
+    let mut program = program(typed.iter().any(|word| word == "-h"));
+    let args = match preset::expand(typed, &program) {
         Ok(args) => {
-            let parsed = match Args::try_parse_from(&args) {
+            let parsed = match parsed(&mut program, args.clone()) {
                 Err(error) if error.kind() == ErrorKind::UnknownArgument => {
-                    Args::try_parse_from(negative_values(args))
+                    parsed(&mut program, negative_values(args))
                 }
                 parsed => parsed,
             };
@@ -84,6 +93,17 @@ pub fn main() -> ExitCode {
             failed(&error)
         }
     }
+}
+
+/// The command line; with `short` as `-h` shows it.
+fn program(short: bool) -> clap::Command {
+    help::arranged(Args::command(), short)
+}
+
+/// The arguments as they are meant.
+fn parsed(program: &mut clap::Command, args: Vec<OsString>) -> Result<Args, clap::Error> {
+    let matches = program.try_get_matches_from_mut(args)?;
+    Args::from_arg_matches(&matches).map_err(|error| error.format(program))
 }
 
 /// Says what is wrong with the arguments, or shows the help that was asked for.
@@ -143,5 +163,5 @@ fn negative_values(args: Vec<OsString>) -> Vec<OsString> {
 
 fn run(args: Args) -> Result<()> {
     let observer = &Progress::new(args.quiet);
-    args.command.run(&Args::command(), observer)
+    args.command.run(&program(false), observer)
 }

@@ -8,6 +8,7 @@ mod cli;
 mod compare;
 mod display;
 mod edit;
+mod escapes;
 mod layers;
 mod libraries;
 #[cfg(unix)]

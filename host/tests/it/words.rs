@@ -43,10 +43,17 @@ fn help_of_every_command() {
     let mut found = Vec::new();
     commands(&bench, "", &mut found);
     assert!(found.len() > 40, "only {} commands were found", found.len());
+    let mut short = String::new();
     for (words, help) in found {
+        let output = bench.command(&format!("{words} -h")).env("COLUMNS", "80").output().expect("it starts");
+        let brief = text(&output.stdout);
+        if words.is_empty() || brief.contains("help with all options") {
+            short += &format!("$ foilpress {words} -h\n{brief}\n");
+        }
         let name = if words.is_empty() { "foilpress".to_owned() } else { words.replace(' ', "-") };
         pinned(&format!("help-{name}"), &help);
     }
+    pinned("short-help", &short);
 }
 
 #[test]

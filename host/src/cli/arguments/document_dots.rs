@@ -22,8 +22,9 @@ const BASES: usize = 12;
 pub struct DotsArgs {
     #[command(flatten)]
     pub document: DocumentArgs,
-    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the document keeps its proportions
-    /// [default: the document's own size, else as large as the page allows]
+    /// Size on paper, such as 120x90mm, 12cm or 5x4in
+    ///
+    /// The document keeps its proportions. [default: the document's own size, else as large as the page allows]
     #[arg(long)]
     pub size: Option<Size>,
     #[command(flatten)]

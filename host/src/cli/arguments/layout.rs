@@ -34,7 +34,9 @@ pub struct LayoutArgs {
     /// Space between repeats, such as 2mm, or across and down, such as 2x5mm
     #[arg(long, value_name = "LENGTH", default_value = "0", value_parser = gap)]
     pub gap: Point,
-    /// Mirror the print left to right, for water-slide decals applied face down or window decals seen from inside
+    /// Mirror the print left to right
+    ///
+    /// For water-slide decals applied face down, or window decals seen from inside.
     #[arg(long)]
     pub mirror: bool,
     /// Print crop marks: ticks that show where to cut
@@ -160,8 +162,9 @@ pub fn profile(name: Option<&str>, observer: &dyn Observer) -> Result<Profile> {
 /// What the sheet is made of.
 #[derive(Args, Debug)]
 pub struct MediaArgs {
-    /// Material of the sheet: paper, thick (card), film (decal film; curl correction off), or one of the printer's own
-    /// media types such as plain, cardboard, glossy-paper
+    /// Material of the sheet: paper, thick (card) or film (decal film)
+    ///
+    /// film turns curl correction off. The printer's own media types, such as plain, cardboard, glossy-paper, are known, too.
     #[arg(long, default_value = "paper", value_parser = handling)]
     pub media: Handling,
     /// Curl correction of the printer [default: off for film, on for everything else]

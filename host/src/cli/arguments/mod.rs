@@ -102,12 +102,13 @@ impl FactorArgs {
 /// What to print with.
 #[derive(Args, Clone, Debug)]
 pub struct InkArgs {
-    /// Inks to print with: names and the groups process, metallic, clear, foil, default, all, separated by commas; a
-    /// leading - removes one from the default [default: all but the foils]
+    /// Inks to print with, such as process,MS or -finish [default: all but the foils]
+    ///
+    /// Names and the groups process, metallic, clear, foil, default, all, separated by commas; a leading - removes one from the
+    /// default.
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     pub inks: Option<String>,
-    /// Your own ink library, such as one you measured: its folder, or the name it was added under [default: the built-in
-    /// library]
+    /// Your own ink library: its folder, or the name it was added under [default: the built-in library]
     #[arg(long, value_name = "LIBRARY")]
     pub library: Option<PathBuf>,
     /// Curves of the library to rely on; stacks with other curves are not printed. Bare paper is always there
@@ -169,13 +170,17 @@ pub struct HalftoneArg {
 /// How to map materials to the inks.
 #[derive(Args, Debug)]
 pub struct GamutArgs {
-    /// How to treat materials that no ink can make: basis keeps their differences (the paper's way), clamp keeps each
-    /// one as close as possible, blend lies between, contrast keeps differences between neighbours, auto clamps unless
-    /// that would make different materials look alike that blend keeps apart
+    /// How to treat materials that no ink can make
+    ///
+    /// basis keeps their differences (the paper's way), clamp keeps each one as close as possible, blend lies between, contrast
+    /// keeps differences between neighbours, auto clamps unless that would make different materials look alike that blend keeps
+    /// apart.
     #[arg(long, value_name = "INTENT", default_value = "auto", value_parser = choice::<Intent>())]
     pub intent: Intent,
-    /// What "close" means: light counts how much light a material returns beside the shape of its highlight, so that
-    /// metals shine; paper is the distance of the 2009 paper, which counts the shape alone
+    /// What "close" means
+    ///
+    /// light counts how much light a material returns beside the shape of its highlight, so that metals shine; paper is the
+    /// distance of the 2009 paper, which counts the shape alone.
     #[arg(long, value_name = "METRIC", default_value = "light", value_parser = choice::<Metric>())]
     pub metric: Metric,
 }

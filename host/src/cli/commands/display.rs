@@ -49,23 +49,31 @@ const GAP: usize = 16;
     light, eye and screen, and plays the frames. docs/guide/display.md shows it step by step."
 )]
 pub struct Args {
-    /// Images to show, one a frame: plain pictures (.png, .jpg, .tif), whose colours are taken as matte, or documents as given
-    /// to `print`. All have the same number of pixels
+    /// Images to show, one a frame: plain pictures or documents of the same pixels
+    ///
+    /// The colours of plain pictures (.png, .jpg, .tif) are taken as matte. Documents are named as for `print`. All have the same
+    /// number of pixels.
     #[arg(value_name = "IMAGE", required = true)]
     images: Vec<String>,
     /// Distance from one pixel of the screen to the next, such as 0.28mm
     #[arg(long, value_name = "LENGTH")]
     pitch: Mm,
-    /// Pixels of the screen, across and down, such as 1920x1080; the masks have as many
+    /// Pixels of the screen, across and down, such as 1920x1080
+    ///
+    /// The masks have as many.
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = pixels)]
     mask_size: (u32, u32),
-    /// Pixels along the longer side of the display; larger images are averaged [default: those of the images]
+    /// Pixels of the longer side [default: those of the images]
+    ///
+    /// Larger images are averaged.
     #[arg(long, value_name = "PIXELS", value_parser = whole(1..=LONGEST))]
     pixels: Option<u32>,
     /// Screen pixels along each side of a printed cell
     #[arg(long, value_name = "PIXELS", default_value_t = 1, value_parser = whole(1..=LONGEST))]
     cell: u32,
-    /// Stacks of the grid, 2 to 9 separated by commas, such as MS+F,MS,K,W [default: the four that show the images best]
+    /// Stacks of the grid, such as MS+F,MS,K,W [default: the best four]
+    ///
+    /// 2 to 9, separated by commas. [default: the four that show the images best]
     #[arg(long, value_name = "STACKS", value_delimiter = ',')]
     stacks: Vec<Stack>,
     /// Shares of the light that pass an open and a closed pixel of the screen once

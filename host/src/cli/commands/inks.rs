@@ -23,7 +23,7 @@ use crate::cli::console::{closed_pipe, draw, show, stdout};
 use crate::cli::output::Staged;
 use crate::libraries;
 use appearance::brdf::plot;
-use observe::Observer;
+use observe::{Observer, visible_line};
 use sheet::dots_in_words;
 
 /// The library of inks and stacks.
@@ -267,7 +267,7 @@ fn list(library: &Library, inks: Option<InkSet>, json: bool) -> anyhow::Result<S
         return Ok(serde_json::to_string_pretty(&rows)? + "\n");
     }
     let mut text = String::new();
-    writeln!(text, "{}\n{}\n", library.name(), library.about())?;
+    writeln!(text, "{}\n{}\n", visible_line(library.name()), library.about())?;
     writeln!(
         text,
         "{:>3}  {:<10} {:>9} {:>9}  {:<10} layers, bottom first",
@@ -325,6 +325,7 @@ fn describe(library: &Library, entry: &Entry, figures: bool) -> String {
     }
     lines.push(String::new());
     lines.push("reflectance in 1/sr over the half angle:".into());
+    let lines: Vec<_> = lines.iter().map(|line| visible_line(line)).collect();
     lines.join("\n") + "\n"
 }
 
@@ -393,7 +394,8 @@ fn layer_lines(library: &Library, ink: Ink, place: &str) -> Vec<String> {
 
 fn check(dir: &Path, json: bool) -> anyhow::Result<(String, anyhow::Result<()>)> {
     let problems = Library::check(dir);
-    let mut text: String = problems.iter().map(|problem| format!("{problem}\n")).collect();
+    let mut text: String =
+        problems.iter().map(|problem| problem.to_string().replace('\n', "\n    ") + "\n").collect();
     let count = |severity| problems.iter().filter(|problem| problem.severity == severity).count();
     let (errors, warnings, notes) = (count(Severity::Error), count(Severity::Warning), count(Severity::Note));
     if let Ok(library) = Library::from_dir(dir) {

@@ -260,8 +260,10 @@ impl LayersArgs {
 pub struct Work {
     #[command(flatten)]
     layers: LayersArgs,
-    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the artwork keeps its proportions
-    /// [default: the size stated in the files, else 600 dpi for layers and as large as the page allows for a plain picture]
+    /// Size on paper, such as 120x90mm, 12cm or 5x4in
+    ///
+    /// The artwork keeps its proportions. [default: the size stated in the files, else 600 dpi for layers and as large as the
+    /// page allows for a plain picture]
     #[arg(long)]
     size: Option<Size>,
     /// Resolution of the print across the sheet: 600, or 1200 for art in cyan, magenta, yellow and black only

@@ -38,39 +38,48 @@ pub enum Command {
     /// Writes one folder with the job, the plan, the sheet as the simulated printer prints it, and previews. With --to the
     /// job is also sent to a printer.
     Print(Box<print::Args>),
-    /// Print spot-colour artwork: a picture for each ink, reserved colours, or named layers
+    /// Print spot-colour artwork
+    ///
+    /// It is a picture for each ink, one picture with reserved colours, or a drawing or document with named layers.
     ///
     /// Writes one folder with the job, the plan, the sheet as the simulated printer prints it, and previews. With --to the
     /// job is also sent to a printer.
     Layers(Box<layers::Args>),
-    /// Show what a job or a document needs: cartridges, passes, ribbon, time and cautions
+    /// Show what a print needs: cartridges, passes, ribbon, time, cautions
     ///
     /// Sends nothing, and writes nothing unless --html names a file.
     Plan(Box<plan::Args>),
-    /// Show a document or a sheet under any light: a page to handle it in a browser, or a picture
+    /// Show a document or a sheet under any light, as a page or a picture
+    ///
+    /// The page is for a browser: the sheet is turned, bent and lit by hand.
     Preview(Box<preview::Args>),
-    /// Compare photographs of a printed sheet with its prediction: figures, and a page with sliders
+    /// Compare photographs of a printed sheet with its prediction
+    ///
+    /// Shows figures, and writes a page with sliders.
     Compare(Box<compare::Args>),
-    /// Make a display of materials: print a grid of stacks, and write what a screen over it has to show
+    /// Make a display: a printed grid of stacks under a screen
     ///
     /// Writes one folder with the job of the grid, a mask for each image and one to align by, pictures of what is seen, and a
     /// page that shows it all. With --to the job is also sent to a printer.
     Display(Box<display::Args>),
-    /// Print a chart: to judge stacks by eye, to measure inks, or to calibrate the printer
+    /// Print a chart to judge stacks, measure inks or calibrate the printer
     Chart(Box<chart::Args>),
     /// Save, list and use named sets of options
     Preset(preset::Args),
     /// Show how much ribbon each cartridge has used
     Ledger(ledger::Args),
-    /// List paper sizes with their printable areas and margins, and how well each is known
+    /// List paper sizes with their printable areas and margins
+    ///
+    /// Says how well each is known.
     Papers(papers::Args),
     /// Manage printer calibration profiles (offset, feed)
     Profile(profile::Args),
     /// Factor a document into a few basis materials and their weight maps
     Factor(steps::Factor),
-    /// Edit the basis materials of a document: rougher, tinted, replaced, swapped, everywhere or under a mask
+    /// Edit the basis materials of a document
     ///
-    /// The document itself stays as it is. The edited document keeps its steps, which can be changed and replayed.
+    /// They become rougher or glossier, are tinted, replaced, mixed or swapped, everywhere or under a mask. The document itself
+    /// stays as it is. The edited document keeps its steps, which can be changed and replayed.
     Edit(edit::Args),
     /// Map basis materials (or every pixel) to mixtures of printable stacks
     Map(steps::Map),
@@ -84,7 +93,7 @@ pub enum Command {
     Encode(steps::Encode),
     /// Print a job on the simulated printer and keep the sheet
     Simulate(steps::Simulate),
-    /// Describe the contents of a job and report errors with their byte offset
+    /// Describe a job and report errors with their byte offset
     Inspect(inspect::Args),
     /// Send a job to a printer, through a bridge or directly to a device
     Send(send::Args),
@@ -96,7 +105,7 @@ pub enum Command {
     Bridge(bridge::Args),
     /// Find out what prevents printing and how to fix it
     Doctor(doctor::Args),
-    /// Manage ink libraries: list, show, check, compare, share; choose cartridges
+    /// Manage ink libraries, and choose cartridges
     Inks(inks::Args),
     /// Measure printed stacks from photographs
     ///

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use appearance::brdf::{Difference, Space, compare, plot};
 use inks::{Entry, Library, Origins, Stack};
+use observe::visible_line;
 use press::html::{self, escape};
 use serde::Serialize;
 
@@ -132,7 +133,10 @@ fn listed(stacks: &[&Stack]) -> String {
 fn words(report: &Report<'_>) -> Result<String> {
     let mut text = format!(
         "first:  {}\n        {}\nsecond: {}\n        {}\n\n",
-        report.first, report.origins[0], report.second, report.origins[1]
+        visible_line(report.first),
+        report.origins[0],
+        visible_line(report.second),
+        report.origins[1]
     );
     let differ: Vec<_> = report.stacks.iter().filter(|row| !row.is_equal()).collect();
     if !differ.is_empty() {
