@@ -10,6 +10,7 @@
 
 use std::path::Path;
 
+use observe::Diagnosis;
 use protocol::ink::Ink;
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::bytestream::ZCursor;
@@ -19,7 +20,7 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 use super::artwork::Artwork;
 use super::coverage::{Coverage, Scan};
 use super::decode::{jpeg_frame, whole_jpeg};
-use super::error::{LayersError, io, wrong};
+use super::error::{io, wrong};
 use super::names::{self, stem};
 use super::options::Options;
 use super::orientation::Turn;
@@ -30,7 +31,7 @@ use pictures::resolution::{self, Dpi};
 pub(super) const PLATES: [Ink; 4] = [Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black];
 
 /// Reads a JPEG with four channels; `None` if it has another number of channels.
-pub(super) fn read_jpeg(path: &Path, options: &Options) -> Result<Option<Artwork>, LayersError> {
+pub(super) fn read_jpeg(path: &Path, options: &Options) -> Result<Option<Artwork>, Diagnosis> {
     let read = io(path, "read it");
     if std::fs::metadata(path).map_err(&read)?.len() > MOST_BYTES {
         return Err(wrong(path, "the file is larger than a gigabyte"));
@@ -41,7 +42,9 @@ pub(super) fn read_jpeg(path: &Path, options: &Options) -> Result<Option<Artwork
     size::check_pixels(path, width, height)?;
     whole_jpeg(path, &bytes)?;
     if options.reserved {
-        return Err(wrong(path, "the picture is CMYK, but reserved colours are sRGB; convert it to sRGB"));
+        return Err(
+            wrong(path, "the picture is CMYK, but reserved colours are sRGB").hint("convert it to sRGB")
+        );
     }
     let bad = |error| wrong(path, format!("cannot decode the picture: {error}"));
     // The limits of the format: the size was checked above.
@@ -92,7 +95,7 @@ fn artwork(
     plates: Vec<Vec<u8>>,
     profile: bool,
     options: &Options,
-) -> Result<Artwork, LayersError> {
+) -> Result<Artwork, Diagnosis> {
     let mut notes = vec![note(path, profile)];
     let sides = (f64::from(width), f64::from(height));
     let dots = size::dots(path, sides, dpi, Unstated::FillRoom, options, &mut notes)?;
@@ -195,7 +198,7 @@ mod tests {
             let options = Options { dpi: Some(600.0), ..Options::default() };
             if let Err(error) = read_jpeg(&path, &options) {
                 // A size error names the page; any other error names the file.
-                let size = matches!(error, LayersError::TooSmall { .. } | LayersError::TooLarge { .. });
+                let size = error.fault() == observe::Fault::Setting;
                 prop_assert!(size || error.to_string().contains("photo.jpg"), "{}", error);
             }
         }

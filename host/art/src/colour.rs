@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use super::averages::{averaged, joined};
 use super::bitplane;
 use super::compose::Settings;
-use super::error::LayersError;
+use super::error::{not_halftoned, unfitted};
 use super::flat::{BLACK, Flat, INKED, TONE, is_tone, split};
 use super::intent::Intent;
 use super::lattice::{Lattice, Nodes, ends, step, with_tints};
@@ -32,7 +32,7 @@ use appearance::document::SAMPLES;
 use appearance::gamut::{self, InkMix, Printable};
 use appearance::weights::{ONE, WeightMaps};
 use halftone::halftone;
-use observe::Observer;
+use observe::{Diagnosis, Observer};
 use sheet::{Plane, pack};
 
 /// Colours to print with the process inks.
@@ -134,7 +134,7 @@ impl Colour {
         settings: &Settings,
         library: &Library,
         observer: &dyn Observer,
-    ) -> Result<Vec<(Ink, Plane)>, LayersError> {
+    ) -> Result<Vec<(Ink, Plane)>, Diagnosis> {
         if let Some(black) = &self.black {
             let inks = black_inks(inks, library);
             return Ok(inks.into_iter().map(|ink| (ink, black.clone())).collect());
@@ -157,7 +157,7 @@ impl Colour {
         settings: &Settings,
         library: &Library,
         observer: &dyn Observer,
-    ) -> Result<(Vec<Stack>, Vec<u8>), LayersError> {
+    ) -> Result<(Vec<Stack>, Vec<u8>), Diagnosis> {
         let space = Space::half_angle(SAMPLES);
         let printable = Printable::from_library(library, inks, &space);
         let solids = Solids::new(&printable, &space);
@@ -183,7 +183,7 @@ impl Colour {
             method: settings.halftone,
             ..halftone::Settings::from_library(&mix.stacks, library)
         };
-        Ok(halftone(&mix, size, fixed.as_deref(), &toning, observer)?.into_parts())
+        Ok(halftone(&mix, size, fixed.as_deref(), &toning, observer).map_err(not_halftoned)?.into_parts())
     }
 
     /// Fits the nodes of the lattices that are needed.
@@ -193,7 +193,7 @@ impl Colour {
         space: Space,
         settings: &Settings,
         observer: &dyn Observer,
-    ) -> Result<Fit, LayersError> {
+    ) -> Result<Fit, Diagnosis> {
         let has_drawings = self.flat.colours.len() > 2 || !self.drawn.is_empty();
         let intents: &[Intent] = match settings.intent {
             Intent::Auto if has_drawings => &[Intent::Perceptual, Intent::Colorimetric],
@@ -208,11 +208,11 @@ impl Colour {
             light: 0.0,
             ..gamut::GamutSettings::default()
         };
-        let mut mix = gamut::clamped(&lattice, printable, &clamp, observer)?.mix;
+        let mut mix = gamut::clamped(&lattice, printable, &clamp, observer).map_err(unfitted)?.mix;
         let of_drawings = intents.len() - 1;
         if of_drawings > 0 {
             let named = |colour| solids.named(colour);
-            mix = with_tints(mix, of_drawings, settings.gamma, named).map_err(gamut::GamutError::from)?;
+            mix = with_tints(mix, of_drawings, settings.gamma, named).map_err(unfitted)?;
         }
         let InkMix { stacks, maps, matrix } = mix;
         let channels = maps.channels();
@@ -221,7 +221,7 @@ impl Colour {
     }
 
     /// The mixture of stacks at every pixel.
-    fn mix(&self, fit: Fit) -> Result<InkMix, LayersError> {
+    fn mix(&self, fit: Fit) -> Result<InkMix, Diagnosis> {
         let channels = fit.channels;
         let mut data = vec![0u16; self.width * self.height * channels];
         data.par_chunks_mut(channels << 12).zip(self.rgb.par_chunks(3 << 12)).enumerate().for_each(
@@ -237,8 +237,7 @@ impl Colour {
                 }
             },
         );
-        let maps =
-            WeightMaps::new(self.width, self.height, channels, data).map_err(gamut::GamutError::from)?;
+        let maps = WeightMaps::new(self.width, self.height, channels, data).map_err(unfitted)?;
         Ok(InkMix { stacks: fit.stacks, maps, matrix: fit.matrix })
     }
 

@@ -21,13 +21,15 @@ use serde::Serialize;
 
 use super::artwork::{Artwork, Shape};
 use super::bitplane;
-use super::error::LayersError;
+use super::error::{
+    foil, no_sheet, not_halftoned, nothing, only_white, too_many_passes, too_small, unfitted,
+};
 use super::size::MM;
 use super::white::White;
 use appearance::gamut::InkMix;
 use appearance::weights::{ONE, WeightMaps};
 use halftone::halftone;
-use observe::Observer;
+use observe::{Diagnosis, Observer};
 use sheet::DotMap;
 use sheet::order::customary;
 use sheet::{MOST_PASSES, Plane, pack};
@@ -73,17 +75,14 @@ pub fn compose(
     settings: &Settings,
     library: &Library,
     observer: &dyn Observer,
-) -> Result<Composed, LayersError> {
+) -> Result<Composed, Diagnosis> {
     let mut notes = art.notes.clone();
     let mut tell = |note: String| {
         observer.note(&note);
         notes.push(note);
     };
     if art.width as u64 * art.length as u64 == 0 {
-        return Err(LayersError::TooSmall {
-            width_mm: art.width as f64 * MM,
-            height_mm: art.length as f64 * MM,
-        });
+        return Err(too_small(art.width as f64 * MM, art.length as f64 * MM));
     }
     let mut slots = drawn_slots(art, settings, library, observer, &mut tell)?;
     beds::lay_white(&mut slots, art, settings, &mut tell)?;
@@ -92,11 +91,11 @@ pub fn compose(
     if slots.is_empty() {
         let is_drawn = art.opaque.as_ref().is_some_and(|opaque| opaque.dots() > 0);
         let reason = match &art.layers[..] {
-            [] if is_drawn => return Err(LayersError::White { name: art.name.clone() }),
+            [] if is_drawn => return Err(only_white(&art.name)),
             [] => format!("{} is white or transparent everywhere", art.name),
             _ => format!("no layer of {} has a dot", art.name),
         };
-        return Err(LayersError::Nothing { reason });
+        return Err(nothing(reason));
     }
     let mut inks: Vec<Ink> = slots.iter().map(|slot| slot.ink).collect();
     inks.sort_unstable();
@@ -113,7 +112,7 @@ pub fn compose(
     if passes > MOST_PASSES {
         let inks =
             slots.iter().flat_map(|slot| vec![slot.ink.name(); slot.passes]).collect::<Vec<_>>().join(", ");
-        return Err(LayersError::Passes { passes, inks });
+        return Err(too_many_passes(passes, &inks));
     }
     stack_up(art, &slots, settings, notes)
 }
@@ -125,7 +124,7 @@ fn drawn_slots(
     library: &Library,
     observer: &dyn Observer,
     tell: &mut dyn FnMut(String),
-) -> Result<Vec<Slot>, LayersError> {
+) -> Result<Vec<Slot>, Diagnosis> {
     let mut slots: Vec<Slot> = Vec::new();
     for layer in &art.layers {
         let name = layer.ink.name();
@@ -140,7 +139,7 @@ fn drawn_slots(
         }
         if !settings.inks.contains(layer.ink) {
             if layer.ink.kind() == Kind::Foil {
-                return Err(LayersError::Foil { layer: layer.name.clone(), ink: layer.ink });
+                return Err(foil(&layer.name, layer.ink));
             }
             tell(format!("{}: left out, because {name} is not among the allowed inks", layer.name));
             continue;
@@ -183,13 +182,12 @@ fn tone(
     settings: &Settings,
     library: &Library,
     observer: &dyn Observer,
-) -> Result<Plane, LayersError> {
+) -> Result<Plane, Diagnosis> {
     let weights = coverage.iter().flat_map(|&c| {
         let ink = ((u32::from(c) * u32::from(ONE) + 127) / 255) as u16;
         [ONE - ink, ink]
     });
-    let maps = WeightMaps::new(art.width, art.length, 2, weights.collect())
-        .map_err(appearance::gamut::GamutError::from)?;
+    let maps = WeightMaps::new(art.width, art.length, 2, weights.collect()).map_err(unfitted)?;
     let stacks = vec![Stack::SUBSTRATE, Stack::new([ink])];
     let mix = InkMix { stacks, maps, matrix: vec![vec![ONE, 0], vec![0, ONE]] };
     let (width, height) = (art.width as u16, art.length as u16);
@@ -204,7 +202,7 @@ fn tone(
         _ => halftone::TONE,
     });
     let fixed: Vec<u8> = fixed.collect();
-    let dots = halftone(&mix, (width, height), Some(&fixed), &toning, observer)?;
+    let dots = halftone(&mix, (width, height), Some(&fixed), &toning, observer).map_err(not_halftoned)?;
     Ok(bitplane::from_bytes(art.width, dots.index(), |stack| stack == 1))
 }
 
@@ -243,7 +241,7 @@ fn stack_up(
     slots: &[Slot],
     settings: &Settings,
     notes: Vec<String>,
-) -> Result<Composed, LayersError> {
+) -> Result<Composed, Diagnosis> {
     let (width, length) = (art.width, art.length);
     let planes: Vec<&Plane> = slots.iter().map(|slot| &slot.plane).collect();
     let census = pack::census(&planes, width, length);
@@ -263,7 +261,7 @@ fn stack_up(
     }
     // Every combination that occurs has an entry in the table, so unpacking always succeeds.
     let index = pack::unpack(&planes, width, length, &stack_of).unwrap_or_default();
-    let dots = DotMap::new(width, length, stacks, index)?;
+    let dots = DotMap::new(width, length, stacks, index).map_err(no_sheet)?;
     let laid: Vec<Laid> = slots
         .iter()
         .enumerate()

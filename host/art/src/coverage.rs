@@ -8,9 +8,10 @@ use std::io::{BufRead, BufReader, Seek};
 use std::path::{Path, PathBuf};
 
 use super::decode::{decode, undecodable};
-use super::error::{LayersError, io, resolution_in_words, wrong};
+use super::error::{io, resolution_in_words, wrong};
 use super::orientation::Turn;
 use super::size::{MOST_BYTES, check_pixels};
+use observe::Diagnosis;
 use pictures::resolution::{Dpi, of_png};
 
 /// The rule that gave the coverage.
@@ -163,7 +164,7 @@ impl CoverageBuilder {
 }
 
 /// Reads the coverage of one layer's picture; of a TIFF with several pages that of the page of this number.
-pub(super) fn scan(path: &Path, page: Option<u32>) -> Result<Scan, LayersError> {
+pub(super) fn scan(path: &Path, page: Option<u32>) -> Result<Scan, Diagnosis> {
     let file = std::fs::File::open(path).map_err(io(path, "open it"))?;
     if file.metadata().map_err(io(path, "read its size"))?.len() > MOST_BYTES {
         return Err(wrong(path, "the file is larger than a gigabyte"));
@@ -186,7 +187,7 @@ pub(super) fn scan(path: &Path, page: Option<u32>) -> Result<Scan, LayersError> 
     Ok(Scan { path: path.to_path_buf(), width, height, dpi: picture.dpi, coverage, by })
 }
 
-fn scan_png(path: &Path, file: impl BufRead + Seek) -> Result<Scan, LayersError> {
+fn scan_png(path: &Path, file: impl BufRead + Seek) -> Result<Scan, Diagnosis> {
     let bad = |error: png::DecodingError| {
         let cause = if let png::DecodingError::IoError(cause) = &error { Some(cause) } else { None };
         undecodable(path, &error, cause)

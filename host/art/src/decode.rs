@@ -9,10 +9,11 @@ use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 use image::{DynamicImage, ImageError, ImageFormat};
+use observe::Diagnosis;
 use pictures::Bounds;
 use pictures::resolution::{self, Dpi};
 
-use super::error::{LayersError, io, wrong};
+use super::error::{io, wrong};
 use super::orientation::Turn;
 use super::size::{MOST_BYTES, MOST_PIXELS, check_pixels};
 use super::tiff_pages;
@@ -25,7 +26,7 @@ pub(super) struct Decoded {
 }
 
 /// Decodes a whole picture; of a TIFF with several pages the one of this number.
-pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Result<Decoded, LayersError> {
+pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Result<Decoded, Diagnosis> {
     let mut bytes = Vec::new();
     file.by_ref().take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(io(path, "read it"))?;
     let guessed = image::guess_format(&bytes).ok();
@@ -35,7 +36,7 @@ pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Res
     });
     let Some(format) = format else {
         let found = match guessed {
-            Some(format) => format!("{format:?}").to_uppercase() + ", which is not read; save it as PNG",
+            Some(format) => format!("{format:?}").to_uppercase() + ", which is not read",
             None if bytes.is_empty() => "an empty file".into(),
             // As drawings in `.svgz` are.
             None if bytes.starts_with(b"\x1f\x8b") => {
@@ -51,10 +52,8 @@ pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Res
         ));
     };
     if format == ImageFormat::Jpeg && jpeg_frame(&bytes).is_some_and(|(channels, ..)| channels == 4) {
-        return Err(wrong(
-            path,
-            "the picture is CMYK, which is four layers instead of one; convert it to greyscale",
-        ));
+        return Err(wrong(path, "the picture is CMYK, which is four layers instead of one")
+            .hint("convert it to greyscale"));
     }
     match format {
         ImageFormat::Jpeg => whole_jpeg(path, &bytes)?,
@@ -63,8 +62,8 @@ pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Res
     }
     let bad = |error: ImageError| {
         if let ImageError::Unsupported(found) = &error {
-            let problem = format!("{found}; save the picture in RGB or grey, with 8 or 16 bits a channel");
-            return wrong(path, problem);
+            return wrong(path, found.to_string())
+                .hint("save the picture in RGB or grey, with 8 or 16 bits a channel");
         }
         let cause = if let ImageError::IoError(cause) = &error { Some(cause) } else { None };
         undecodable(path, &error, cause)
@@ -85,7 +84,7 @@ pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Res
 const CUT_SHORT: &str = "the picture ends before its last row: the file was cut short; copy or save it again";
 
 /// Why a picture cannot be decoded; `cause` is what reading its bytes ended with, if that is the reason.
-pub(super) fn undecodable(path: &Path, error: &impl Display, cause: Option<&std::io::Error>) -> LayersError {
+pub(super) fn undecodable(path: &Path, error: &impl Display, cause: Option<&std::io::Error>) -> Diagnosis {
     match cause {
         Some(cause) if cause.kind() == ErrorKind::UnexpectedEof => wrong(path, CUT_SHORT),
         _ => wrong(path, format!("cannot decode the picture: {error}")),
@@ -93,7 +92,7 @@ pub(super) fn undecodable(path: &Path, error: &impl Display, cause: Option<&std:
 }
 
 /// Refuses a JPEG that was cut short: one without the marker of its end.
-pub(super) fn whole_jpeg(path: &Path, bytes: &[u8]) -> Result<(), LayersError> {
+pub(super) fn whole_jpeg(path: &Path, bytes: &[u8]) -> Result<(), Diagnosis> {
     if jpeg_has_end(bytes) { Ok(()) } else { Err(wrong(path, CUT_SHORT)) }
 }
 

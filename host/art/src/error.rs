@@ -1,210 +1,15 @@
 //! Errors of reading and composing art.
 //!
-//! Each error states the file, what was found, and what to do in terms of settings. A program adds how its own user changes
-//! a setting, from the values in the variants.
+//! Each error states the file, what was found, and what to do in terms of settings ([`observe::Diagnosis`]).
 
 use std::fmt;
-use std::path::{Path, PathBuf};
-
-use protocol::ink::Ink;
+use std::path::Path;
 
 use appearance::gamut::GamutError;
 use halftone::HalftoneError;
-use sheet::SheetError;
-
-/// An error of reading or composing art.
-#[derive(Debug, thiserror::Error)]
-pub enum LayersError {
-    /// The operating system reported an error.
-    #[error("{}: cannot {attempt}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What was attempted.
-        attempt: &'static str,
-        /// The system's error.
-        source: std::io::Error,
-    },
-    /// A file is damaged, of an unknown format, or unsuitable.
-    #[error("{}: {problem}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong, what was expected, and what to do.
-        problem: String,
-    },
-    /// The name of a file, channel or layer is that of no ink.
-    #[error(
-        "{}: {part} `{name}` names no ink{}; {}; the inks are {}",
-        path.display(), hint(suggestion), part.remedy(), Ink::ALL.map(Ink::name).join(", ")
-    )]
-    UnknownInk {
-        /// The file.
-        path: PathBuf,
-        /// What has the name.
-        part: NamedPart,
-        /// The name.
-        name: String,
-        /// The nearest known name.
-        suggestion: Option<&'static str>,
-    },
-    /// Neither the file nor the settings state a size, and at 600 dpi the art is larger than the page.
-    #[error(
-        "{} states no resolution; its {} x {} pixels at 600 dpi would be {:.1} x {:.1} mm, but the page has room for {:.1} x \
-         {:.1} mm; set its resolution or its size",
-        path.display(), pixels.0, pixels.1, size_mm.0, size_mm.1, room_mm.0, room_mm.1
-    )]
-    NoSize {
-        /// The file.
-        path: PathBuf,
-        /// Pixels across and down.
-        pixels: (u32, u32),
-        /// Its width and height at 600 dpi, in mm.
-        size_mm: (f64, f64),
-        /// Width and height of the room on the page, in mm.
-        room_mm: (f64, f64),
-        /// The largest width that fits, in mm.
-        fits_mm: f64,
-    },
-    /// At the size that its file states, the art is larger than the page.
-    #[error(
-        "{} {}{:.1} x {:.1} mm, but the page has room for {:.1} x {:.1} mm; print it smaller, {}use larger paper, or crop it",
-        path.display(), says.map_or("is ".into(), |says| format!("states {}, so it is ", resolution_in_words(says))),
-        size_mm.0, size_mm.1, room_mm.0, room_mm.1,
-        if says.is_some() { "correct its resolution, " } else { "" }
-    )]
-    Beyond {
-        /// The file.
-        path: PathBuf,
-        /// Pixels per inch across and down, as the file of a picture states; a drawing states its size.
-        says: Option<(f64, f64)>,
-        /// Its width and height, in mm.
-        size_mm: (f64, f64),
-        /// Width and height of the room on the page, in mm.
-        room_mm: (f64, f64),
-        /// The largest width that fits, in mm.
-        fits_mm: f64,
-    },
-    /// Several pages hold art, and none was chosen.
-    #[error(
-        "{} has art on {} pages ({}); choose one of them, or name an ink for each page",
-        path.display(), pages.len(), listed(pages)
-    )]
-    Pages {
-        /// The file.
-        path: PathBuf,
-        /// The pages that hold art, from 1.
-        pages: Vec<u32>,
-    },
-    /// Two layers differ in size.
-    #[error(
-        "{} is {found}, but {} is {expected}; layers are printed one on another pixel by pixel, so export all of them at the \
-         same size",
-        path.display(), first.display()
-    )]
-    Sizes {
-        /// The file that differs.
-        path: PathBuf,
-        /// Its size.
-        found: String,
-        /// The first file.
-        first: PathBuf,
-        /// Its size.
-        expected: String,
-    },
-    /// The art is larger than anything of which a page can be cut.
-    #[error(
-        "the art is {width_mm:.1} x {height_mm:.1} mm; even cropped it can be at most {most_width_mm:.1} x \
-         {most_height_mm:.1} mm; print it smaller"
-    )]
-    TooLarge {
-        /// Its width in mm.
-        width_mm: f64,
-        /// Its height in mm.
-        height_mm: f64,
-        /// The largest width in mm.
-        most_width_mm: f64,
-        /// The largest height in mm.
-        most_height_mm: f64,
-        /// The largest width that fits, in mm.
-        fits_mm: f64,
-    },
-    /// The art is smaller than a dot.
-    #[error(
-        "the art is {width_mm:.4} x {height_mm:.4} mm, less than a dot (0.0423 mm); set a larger size or a lower resolution"
-    )]
-    TooSmall {
-        /// Its width in mm.
-        width_mm: f64,
-        /// Its height in mm.
-        height_mm: f64,
-    },
-    /// No layer has a dot.
-    #[error("there is nothing to print: {reason}")]
-    Nothing {
-        /// Why.
-        reason: String,
-    },
-    /// Everything drawn is white, and the settings ask for no white.
-    #[error("there is nothing to print: {name} is drawn in nothing but white, which is bare paper")]
-    White {
-        /// Name of the art.
-        name: String,
-    },
-    /// A setting does not suit the art.
-    #[error("{setting}: {problem}")]
-    Setting {
-        /// The setting.
-        setting: Setting,
-        /// What is wrong, and what to do.
-        problem: String,
-    },
-    /// A foil that is not among the allowed inks.
-    #[error(
-        "{layer} asks for {}; the codes of the foils are inferred and were never tested on hardware, so foils print only if \
-         they are among the allowed inks", ink.name()
-    )]
-    Foil {
-        /// The layer that asks for it.
-        layer: String,
-        /// The foil.
-        ink: Ink,
-    },
-    /// More passes than a sheet can take.
-    #[error(
-        "the art needs {passes} passes ({inks}), but a sheet can take {}; print some inks fewer times",
-        sheet::MOST_PASSES
-    )]
-    Passes {
-        /// How many.
-        passes: usize,
-        /// Their inks from the paper up.
-        inks: String,
-    },
-    /// A required program is not installed.
-    #[error("{}: reading it needs {program}, which is not installed; {install}", path.display())]
-    Program {
-        /// The file to read.
-        path: PathBuf,
-        /// The program.
-        program: &'static str,
-        /// How to install it.
-        install: &'static str,
-    },
-    /// Fitting colours to the process inks.
-    #[error("cannot fit the colours to the process inks")]
-    Gamut(#[from] GamutError),
-    /// Halftoning.
-    #[error(transparent)]
-    Halftone(#[from] HalftoneError),
-    /// The stacks are invalid.
-    #[error(transparent)]
-    Sheet(#[from] SheetError),
-}
-
-fn hint(suggestion: &Option<&'static str>) -> String {
-    suggestion.map_or(String::new(), |s| format!(" (did you mean `{s}`?)"))
-}
+use observe::{Diagnosis, Fault};
+use protocol::ink::Ink;
+use sheet::{MOST_PASSES, SheetError};
 
 /// What of art is named after an ink.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -246,54 +51,183 @@ impl fmt::Display for NamedPart {
     }
 }
 
-/// Numbers in words, the first few of many.
-fn listed(numbers: &[u32]) -> String {
+/// An error about a file.
+pub(super) fn wrong(path: &Path, problem: impl Into<String>) -> Diagnosis {
+    Diagnosis::of_file(path, problem)
+}
+
+/// Makes errors of the operating system errors about a file.
+pub(super) fn io<'a>(path: &'a Path, attempt: &'static str) -> impl Fn(std::io::Error) -> Diagnosis + 'a {
+    move |source| wrong(path, format!("cannot {attempt}")).because(source)
+}
+
+/// The name of a file, channel or layer is that of no ink; `suggestion` is the nearest known name.
+pub(super) fn unknown_ink(path: &Path, part: NamedPart, name: &str, suggestion: Option<&str>) -> Diagnosis {
+    let meant = suggestion.map_or(String::new(), |s| format!(" (did you mean `{s}`?)"));
+    Diagnosis::new(Fault::Name, format!("{part} `{name}` names no ink{meant}"))
+        .about(path)
+        .hint(part.remedy())
+        .hint(format!("the inks are {}", Ink::ALL.map(Ink::name).join(", ")))
+}
+
+/// Neither the file nor the settings state a size, and at 600 dpi the art is larger than the page. `fits_mm` is the largest width
+/// that fits.
+pub(super) fn no_size(
+    path: &Path,
+    pixels: (f64, f64),
+    size_mm: (f64, f64),
+    room_mm: (f64, f64),
+    fits_mm: f64,
+) -> Diagnosis {
+    let problem = format!(
+        "{} states no resolution; its {:.0} x {:.0} pixels at 600 dpi would be {:.1} x {:.1} mm, but the page has room for {:.1} x \
+         {:.1} mm",
+        path.display(),
+        pixels.0,
+        pixels.1,
+        size_mm.0,
+        size_mm.1,
+        room_mm.0,
+        room_mm.1
+    );
+    let diagnosis = Diagnosis::new(Fault::Setting, problem);
+    match largest(fits_mm) {
+        None => nothing_fits(diagnosis),
+        Some(size) => diagnosis.hint("set its resolution or its size").set("dpi", "1200").set("size", size),
+    }
+}
+
+/// At the size that its file states, the art is larger than the page. `says` is the resolution that the file of a picture states;
+/// a drawing states its size.
+pub(super) fn beyond(
+    path: &Path,
+    says: Option<(f64, f64)>,
+    size_mm: (f64, f64),
+    room_mm: (f64, f64),
+    fits_mm: f64,
+) -> Diagnosis {
+    let stated = says.map_or("is ".into(), |says| format!("states {}, so it is ", resolution_in_words(says)));
+    let problem = format!(
+        "{} {stated}{:.1} x {:.1} mm, but the page has room for {:.1} x {:.1} mm",
+        path.display(),
+        size_mm.0,
+        size_mm.1,
+        room_mm.0,
+        room_mm.1
+    );
+    let diagnosis = Diagnosis::new(Fault::Setting, problem);
+    let correct = if says.is_some() { "correct its resolution, " } else { "" };
+    match largest(fits_mm) {
+        None => nothing_fits(diagnosis),
+        Some(size) => {
+            let diagnosis = diagnosis
+                .hint(format!("print it smaller, {correct}use larger paper, or crop it"))
+                .set("size", size);
+            let diagnosis = if says.is_some() { diagnosis.set("dpi", "") } else { diagnosis };
+            diagnosis.set("paper", "").set("crop", "")
+        }
+    }
+}
+
+/// The largest width that fits, in words, if any does.
+fn largest(fits_mm: f64) -> Option<String> {
+    let below = (10.0 * fits_mm).floor() / 10.0;
+    (below > 0.0).then(|| format!("{below}mm"))
+}
+
+/// What to do where the room is full.
+fn nothing_fits(diagnosis: Diagnosis) -> Diagnosis {
+    diagnosis
+        .hint("nothing fits there: print fewer copies with a smaller gap, or use larger paper")
+        .set("repeat", "")
+        .set("gap", "")
+        .set("paper", "")
+}
+
+/// Several pages, counted from 1, hold art, and none was chosen.
+pub(super) fn several_pages(path: &Path, pages: &[u32]) -> Diagnosis {
     const NAMED: usize = 8;
-    let named: Vec<String> = numbers.iter().take(NAMED).map(u32::to_string).collect();
-    named.join(", ") + if numbers.len() > NAMED { ", …" } else { "" }
+    let named: Vec<String> = pages.iter().take(NAMED).map(u32::to_string).collect();
+    let more = if pages.len() > NAMED { ", …" } else { "" };
+    let problem = format!("{} has art on {} pages ({}{more})", path.display(), pages.len(), named.join(", "));
+    Diagnosis::new(Fault::Setting, problem)
+        .hint("choose one of them, or name an ink for each page")
+        .set("page", pages.first().unwrap_or(&1).to_string())
+        .set("pages", "white,gold,black")
+}
+
+/// The art is larger than anything of which a page can be cut; sizes in mm.
+pub(super) fn too_large(size: (f64, f64), most: (f64, f64), fits_mm: f64) -> Diagnosis {
+    let problem = format!(
+        "the art is {:.1} x {:.1} mm; even cropped it can be at most {:.1} x {:.1} mm",
+        size.0, size.1, most.0, most.1
+    );
+    Diagnosis::new(Fault::Setting, problem)
+        .hint("print it smaller")
+        .set("size", largest(fits_mm).unwrap_or_default())
+}
+
+/// The art is smaller than a dot; its size in mm.
+pub(super) fn too_small(width: f64, height: f64) -> Diagnosis {
+    Diagnosis::new(
+        Fault::Setting,
+        format!("the art is {width:.4} x {height:.4} mm, less than a dot (0.0423 mm)"),
+    )
+    .hint("set a larger size or a lower resolution")
+    .set("size", "")
+    .set("dpi", "")
+}
+
+/// No layer has a dot.
+pub(super) fn nothing(reason: impl fmt::Display) -> Diagnosis {
+    Diagnosis::new(Fault::Nothing, format!("there is nothing to print: {reason}"))
+}
+
+/// Everything drawn is white, and the settings ask for no white.
+pub(super) fn only_white(name: &str) -> Diagnosis {
+    nothing(format!("{name} is drawn in nothing but white, which is bare paper"))
+        .hint("print white wherever the art is not transparent")
+        .set("white", "alpha")
+}
+
+/// A layer asks for a foil that is not among the allowed inks.
+pub(super) fn foil(layer: &str, ink: Ink) -> Diagnosis {
+    let problem = format!(
+        "{layer} asks for {}; the codes of the foils are inferred and were never tested on hardware, so foils print only if they \
+         are among the allowed inks",
+        ink.name()
+    );
+    Diagnosis::new(Fault::Setting, problem).hint("allow it").set("inks", format!("+{}", ink.name()))
+}
+
+/// More passes than a sheet can take; the inks from the paper up.
+pub(super) fn too_many_passes(passes: usize, inks: &str) -> Diagnosis {
+    let problem = format!("the art needs {passes} passes ({inks}), but a sheet can take {MOST_PASSES}");
+    Diagnosis::new(Fault::Setting, problem).hint("print some inks fewer times").set("passes", "")
+}
+
+/// A required program is not installed; `install` is how to install it.
+pub(super) fn no_program(path: &Path, program: &str, install: &str) -> Diagnosis {
+    let problem = format!("reading it needs {program}, which is not installed");
+    Diagnosis::new(Fault::Missing, problem).about(path).hint(install)
+}
+
+/// The colours cannot be fitted to the process inks.
+pub(super) fn unfitted(source: impl Into<GamutError>) -> Diagnosis {
+    Diagnosis::new(Fault::Setting, "cannot fit the colours to the process inks").because(source.into())
+}
+
+/// The colours cannot be halftoned.
+pub(super) fn not_halftoned(source: HalftoneError) -> Diagnosis {
+    Diagnosis::new(Fault::Setting, "cannot halftone the colours").because(source)
+}
+
+/// The stacks of the art are invalid.
+pub(super) fn no_sheet(source: SheetError) -> Diagnosis {
+    Diagnosis::new(Fault::Setting, "cannot lay the inks on each other").because(source)
 }
 
 /// Pixels per inch, in words.
 pub(super) fn resolution_in_words((x, y): (f64, f64)) -> String {
     if (x - y).abs() < 0.5 { format!("{x:.0} dpi") } else { format!("{x:.0} x {y:.0} dpi") }
-}
-
-/// A setting of how layers become stacks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Setting {
-    /// The inks that may be used.
-    Inks,
-    /// The order of the layers.
-    Order,
-    /// Where white goes.
-    White,
-    /// How far white is shrunk.
-    Choke,
-    /// How far white is spread.
-    Spread,
-    /// Where finish goes.
-    Finish,
-}
-
-impl fmt::Display for Setting {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Setting::Inks => "allowed inks",
-            Setting::Order => "order of the layers",
-            Setting::White => "white",
-            Setting::Choke => "choke",
-            Setting::Spread => "spread",
-            Setting::Finish => "finish",
-        })
-    }
-}
-
-/// An error about a file.
-pub(super) fn wrong(path: &Path, problem: impl Into<String>) -> LayersError {
-    LayersError::File { path: path.to_path_buf(), problem: problem.into() }
-}
-
-/// Makes errors of the operating system errors about a file.
-pub(super) fn io<'a>(path: &'a Path, attempt: &'static str) -> impl Fn(std::io::Error) -> LayersError + 'a {
-    move |source| LayersError::Io { path: path.to_path_buf(), attempt, source }
 }

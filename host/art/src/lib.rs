@@ -78,7 +78,6 @@ pub use compose::{
     Accept, Composed, Finish, GAMMAS, Laid, MOST_CHOKE_MM, Order, Remedy, Report, Settings, Suggestion,
     compose,
 };
-pub use error::{LayersError, NamedPart, Setting};
 pub use intent::Intent;
 pub use open::{is_art, open};
 pub use options::{Options, Pages, Room};

@@ -7,9 +7,10 @@
 
 use std::path::Path;
 
+use observe::Diagnosis;
 use protocol::ink::Ink;
 
-use super::error::{LayersError, NamedPart};
+use super::error::{NamedPart, unknown_ink};
 
 /// An ink named by a file, a channel or a layer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -102,12 +103,11 @@ pub(super) fn of_part(
     name: &str,
     part: NamedPart,
     notes: &mut Vec<String>,
-) -> Result<Option<Named>, LayersError> {
+) -> Result<Option<Named>, Diagnosis> {
     let named = ink(name);
     if named.is_none() {
         if let suggestion @ Some(_) = closest(name) {
-            let path = path.to_path_buf();
-            return Err(LayersError::UnknownInk { path, part, name: name.into(), suggestion });
+            return Err(unknown_ink(path, part, name, suggestion));
         }
         notes.push(format!("{}: {part} `{name}` names no ink: left out", path.display()));
     }

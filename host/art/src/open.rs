@@ -8,13 +8,13 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use observe::Observer;
+use observe::{Diagnosis, Fault, Observer};
 use protocol::ink::Ink;
 use rayon::prelude::*;
 
 use super::artwork::{Artwork, Layer};
 use super::coverage::{self, Scan};
-use super::error::{LayersError, NamedPart, io, wrong};
+use super::error::{NamedPart, io, nothing, unknown_ink, wrong};
 use super::names::{self, stem};
 use super::options::{Options, Pages};
 use super::picture::Looks;
@@ -39,17 +39,16 @@ const MOST_FILES: usize = 64;
 /// # Errors
 /// Damaged files, unknown inks, layers of different sizes, art without a size, art without a dot. Each error names the
 /// file and what to do.
-pub fn open(paths: &[PathBuf], options: &Options, observer: &dyn Observer) -> Result<Artwork, LayersError> {
+pub fn open(paths: &[PathBuf], options: &Options, observer: &dyn Observer) -> Result<Artwork, Diagnosis> {
     for path in paths {
         // A pipe would be waited for.
         if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
-            return Err(wrong(path, "it is a pipe or a device; save the art as an ordinary file"));
+            return Err(wrong(path, "it is a pipe or a device").hint("save the art as an ordinary file"));
         }
     }
     let mut art = match paths {
         [] => {
-            let reason = "no file was given".into();
-            return Err(LayersError::Nothing { reason });
+            return Err(nothing("no file was given"));
         }
         [folder] if folder.is_dir() => {
             without_pages(folder, options)?;
@@ -88,7 +87,7 @@ pub fn is_art(path: &Path) -> bool {
     ["svg", "pdf", "ps", "eps"].contains(&extension.as_str()) || PICTURES.contains(&extension.as_str())
 }
 
-fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, LayersError> {
+fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, Diagnosis> {
     let start = start_of(file)?;
     if pdf::is_document(&start) {
         return pdf::read(file, options, observer);
@@ -152,7 +151,7 @@ fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<
 }
 
 /// The first bytes of a file.
-fn start_of(file: &Path) -> Result<Vec<u8>, LayersError> {
+fn start_of(file: &Path) -> Result<Vec<u8>, Diagnosis> {
     let mut start = Vec::new();
     let opened = std::fs::File::open(file).map_err(io(file, "open it"))?;
     opened.take(1 << 12).read_to_end(&mut start).map_err(io(file, "read it"))?;
@@ -160,12 +159,12 @@ fn start_of(file: &Path) -> Result<Vec<u8>, LayersError> {
 }
 
 /// Refuses a choice of pages where there are none.
-fn without_pages(path: &Path, options: &Options) -> Result<(), LayersError> {
+fn without_pages(path: &Path, options: &Options) -> Result<(), Diagnosis> {
     if options.pages == Pages::Only {
         return Ok(());
     }
-    let problem = "it has no pages to choose from; pages are those of one PDF, PostScript or TIFF file";
-    Err(wrong(path, problem))
+    Err(wrong(path, "it has no pages to choose from")
+        .hint("pages are those of one PDF, PostScript or TIFF file"))
 }
 
 /// What a folder holds, sorted by name.
@@ -176,7 +175,7 @@ struct Listing {
     others: Vec<PathBuf>,
 }
 
-fn listing(folder: &Path) -> Result<Listing, LayersError> {
+fn listing(folder: &Path) -> Result<Listing, Diagnosis> {
     let listed = io(folder, "list it");
     let (mut files, mut others) = (Vec::new(), Vec::new());
     for entry in std::fs::read_dir(folder).map_err(&listed)? {
@@ -195,9 +194,8 @@ fn listing(folder: &Path) -> Result<Listing, LayersError> {
     }
     if files.is_empty() {
         let found = left_out(folder, &others).map_or(String::new(), |note| format!(" ({note})"));
-        let problem =
-            format!("there is no picture in the folder{found}; name pictures white.png, gold.png, …");
-        return Err(wrong(folder, problem));
+        let problem = format!("there is no picture in the folder{found}");
+        return Err(wrong(folder, problem).hint("name pictures white.png, gold.png, …"));
     }
     if files.len() > MOST_FILES {
         let problem = format!("the folder has {} pictures; expected at most {MOST_FILES}", files.len());
@@ -231,24 +229,17 @@ fn named_files(
     files: &[PathBuf],
     options: &Options,
     observer: &dyn Observer,
-) -> Result<Artwork, LayersError> {
+) -> Result<Artwork, Diagnosis> {
     let source = |path: &PathBuf| {
         let ink = stem(path);
-        let named = names::ink(&ink).ok_or_else(|| LayersError::UnknownInk {
-            path: path.clone(),
-            part: NamedPart::File,
-            suggestion: names::closest(&ink),
-            name: ink,
-        })?;
+        let named =
+            names::ink(&ink).ok_or_else(|| unknown_ink(path, NamedPart::File, &ink, names::closest(&ink)))?;
         let start = start_of(path)?;
         let is_svg = svg::is_svg(path, &start);
         if pdf::is_document(&start) || is_svg {
             let kind = if is_svg { "SVG" } else { "PDF or PostScript" };
-            let problem = format!(
-                "it is {kind}, which is read alone and cannot be one of several layers; export it as PNG, or draw all \
-                 layers in it"
-            );
-            return Err(wrong(path, problem));
+            let problem = format!("it is {kind}, which is read alone and cannot be one of several layers");
+            return Err(wrong(path, problem).hint("export it as PNG, or draw all layers in it"));
         }
         let label = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         Ok(Source { path: path.clone(), page: options.page(), label, named })
@@ -263,7 +254,7 @@ fn pages_of_inks(
     inks: &[Ink],
     options: &Options,
     observer: &dyn Observer,
-) -> Result<Artwork, LayersError> {
+) -> Result<Artwork, Diagnosis> {
     let reading = io(file, "read it");
     if std::fs::metadata(file).map_err(&reading)?.len() > MOST_BYTES {
         return Err(wrong(file, "the file is larger than a gigabyte"));
@@ -284,13 +275,12 @@ fn pages_of_inks(
 }
 
 /// An error about a page that has art, of which the ink that is named for it gets nothing.
-pub(super) fn no_dot(path: &Path, page: &str, ink: Ink) -> LayersError {
+pub(super) fn no_dot(path: &Path, page: &str, ink: Ink) -> Diagnosis {
     let problem = format!(
-        "{page} has art, but {} gets no dot of it: nothing on it is dark enough to be ink; draw it in black, or in one \
-         colour on nothing",
+        "{page} has art, but {} gets no dot of it: nothing on it is dark enough to be ink",
         ink.name()
     );
-    wrong(path, problem)
+    wrong(path, problem).hint("draw it in black, or in one colour on nothing")
 }
 
 /// Where a layer is.
@@ -310,7 +300,7 @@ fn layers(
     stated: Option<Dpi>,
     options: &Options,
     observer: &dyn Observer,
-) -> Result<Artwork, LayersError> {
+) -> Result<Artwork, Diagnosis> {
     observer.begin("reading layers", sources.len() as u64);
     let mut first: Option<First> = None;
     let mut art: Option<Artwork> = None;
@@ -340,7 +330,7 @@ fn layers(
     }
     observer.end();
     // Every caller gives at least one file, so there is art.
-    let mut art = art.ok_or_else(|| LayersError::Nothing { reason: "no file was given".into() })?;
+    let mut art = art.ok_or_else(|| nothing("no file was given"))?;
     art.notes.splice(0..0, notes);
     Ok(art)
 }
@@ -355,7 +345,7 @@ struct First {
 }
 
 impl First {
-    fn new(scan: &Scan, options: &Options, notes: &mut Vec<String>) -> Result<First, LayersError> {
+    fn new(scan: &Scan, options: &Options, notes: &mut Vec<String>) -> Result<First, Diagnosis> {
         let sides = (f64::from(scan.width), f64::from(scan.height));
         Ok(First {
             path: scan.path.clone(),
@@ -367,7 +357,7 @@ impl First {
     }
 
     /// Checks that another layer has the same size, and returns that size in dots.
-    fn check(&self, other: &Scan, options: &Options) -> Result<(usize, usize), LayersError> {
+    fn check(&self, other: &Scan, options: &Options) -> Result<(usize, usize), Diagnosis> {
         // A layer without a resolution has that of another. If two state different ones, one of them is wrong.
         let overridden = options.dpi.is_some() || options.size.is_some();
         let apart = self
@@ -377,12 +367,10 @@ impl First {
         if self.pixels == (other.width, other.height) && !apart {
             return Ok(self.dots);
         }
-        Err(LayersError::Sizes {
-            found: other.size_at(options.dpi),
-            path: other.path.clone(),
-            first: self.path.clone(),
-            expected: self.size.clone(),
-        })
+        let (path, found) = (other.path.display(), other.size_at(options.dpi));
+        let problem = format!("{path} is {found}, but {} is {}", self.path.display(), self.size);
+        Err(Diagnosis::new(Fault::File, problem)
+            .hint("layers are printed one on another pixel by pixel, so export all of them at the same size"))
     }
 }
 

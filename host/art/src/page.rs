@@ -11,13 +11,14 @@ use std::path::Path;
 
 use super::artwork::Artwork;
 use super::colour::Colour;
-use super::error::{LayersError, wrong};
+use super::error::wrong;
 use super::flat::WHITE;
 use super::indexed_page::Numbered;
 use super::kinds::{BYTES, ObjectType, Order};
 use super::options::Options;
 use super::window::Window;
 use super::{bitplane, kinds, picture, size};
+use observe::Diagnosis;
 use sheet::Plane;
 
 /// Rows that are read at once: they stay in the cache.
@@ -95,13 +96,7 @@ impl Page {
     ///
     /// # Errors
     /// A window that does not lie within the page, or has no dots or more than 65535 on a side.
-    pub fn art(
-        self,
-        name: &str,
-        window: &Window,
-        dpi: u16,
-        options: &Options,
-    ) -> Result<Artwork, LayersError> {
+    pub fn art(self, name: &str, window: &Window, dpi: u16, options: &Options) -> Result<Artwork, Diagnosis> {
         let (wide, high) = (window.width, window.height);
         let problem = || {
             let problem = format!("the page is {wide} x {high} pixels; expected 1 to 65535 dots on a side");

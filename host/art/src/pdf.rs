@@ -20,7 +20,7 @@ use protocol::ink::Ink;
 
 use super::artwork::{Artwork, Layer};
 use super::coverage::Scan;
-use super::error::{LayersError, io, wrong};
+use super::error::{io, nothing, several_pages, wrong};
 use super::names::{self, stem};
 use super::open::no_dot;
 use super::options::{Options, Pages};
@@ -28,7 +28,7 @@ use super::picture;
 use super::size::{self, Unstated};
 use draw::{DRAFT, Drafts, Leaf, Part, Tagged};
 use files::scratch::Scratch;
-use observe::Observer;
+use observe::{Diagnosis, Observer};
 
 pub use complaint::{OLDER, cut_short, damaged, no_page};
 pub use ghostscript::{Interpreter, command, interpreter, order};
@@ -43,7 +43,7 @@ pub(super) fn is_document(start: &[u8]) -> bool {
 }
 
 /// Reads a document.
-pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, LayersError> {
+pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, Diagnosis> {
     let folder = Scratch::new().map_err(io(path, "make a folder for its pages"))?;
     let only = options.page();
     observer.begin("reading pages", 2);
@@ -76,14 +76,14 @@ struct Document<'a> {
 
 impl Document<'_> {
     /// The only page that holds art; the first if none does.
-    fn only_page(&self, leaves: &[Leaf]) -> Result<Artwork, LayersError> {
+    fn only_page(&self, leaves: &[Leaf]) -> Result<Artwork, Diagnosis> {
         let drawn: Vec<&Leaf> = leaves.iter().filter(|leaf| leaf.drawn).collect();
         let leaf = match drawn[..] {
             [] => &leaves[0],
             [one] => one,
             _ => {
-                let pages = drawn.iter().map(|leaf| leaf.number).collect();
-                return Err(LayersError::Pages { path: self.path.to_path_buf(), pages });
+                let pages: Vec<u32> = drawn.iter().map(|leaf| leaf.number).collect();
+                return Err(several_pages(self.path, &pages));
             }
         };
         let mut art = self.page(leaf)?;
@@ -99,7 +99,7 @@ impl Document<'_> {
     }
 
     /// One page: plates if spot colours name inks, else a picture.
-    fn page(&self, leaf: &Leaf) -> Result<Artwork, LayersError> {
+    fn page(&self, leaf: &Leaf) -> Result<Artwork, Diagnosis> {
         let name = stem(self.path);
         let mut notes = Vec::new();
         let dpi = self.dpi(leaf, &mut notes)?;
@@ -109,7 +109,7 @@ impl Document<'_> {
                 plates::separated_part((self.path, self.interpreter), leaf.number, Part::CropBox, dpi)?
                     .whole(&name, self.options);
             if art.layers.is_empty() && art.colour.is_none() {
-                return Err(LayersError::Nothing { reason: "no plate of the page has a dot".into() });
+                return Err(nothing("no plate of the page has a dot"));
             }
             notes.retain(|note| !art.notes.contains(note));
             art.notes.append(&mut notes);
@@ -121,7 +121,7 @@ impl Document<'_> {
     }
 
     /// What a page draws, with the kind of each pixel.
-    fn drawn(&self, leaf: &Leaf, dpi: (f64, f64)) -> Result<Artwork, LayersError> {
+    fn drawn(&self, leaf: &Leaf, dpi: (f64, f64)) -> Result<Artwork, Diagnosis> {
         let Tagged { size, pixels } =
             draw::tagged((self.path, self.interpreter), leaf.number, Part::CropBox, dpi, self.folder)?;
         let dots = (size.0 as usize, size.1 as usize);
@@ -134,7 +134,7 @@ impl Document<'_> {
         leaves: &[Leaf],
         inks: &[Ink],
         observer: &dyn Observer,
-    ) -> Result<Artwork, LayersError> {
+    ) -> Result<Artwork, Diagnosis> {
         let path = self.path;
         let beyond = leaves.iter().skip(inks.len()).find(|leaf| leaf.drawn);
         if let Some(leaf) = beyond {
@@ -156,13 +156,13 @@ impl Document<'_> {
             if (leaf.size.0 - first.size.0).abs() > 1.0 || (leaf.size.1 - first.size.1).abs() > 1.0 {
                 let mm = |(x, y): (f64, f64)| format!("{:.0} x {:.0} mm", x * 25.4 / DRAFT, y * 25.4 / DRAFT);
                 let problem = format!(
-                    "page {} is {}, but page {} is {}; the pages of one print have one size",
+                    "page {} is {}, but page {} is {}",
                     leaf.number,
                     mm(leaf.size),
                     first.number,
                     mm(first.size)
                 );
-                return Err(wrong(path, problem));
+                return Err(wrong(path, problem).hint("the pages of one print have one size"));
             }
             let name = format!("page {}", leaf.number);
             let scan = self.layer(leaf, dpi)?;
@@ -176,21 +176,21 @@ impl Document<'_> {
             observer.advance(1);
         }
         observer.end();
-        let mut art = art.ok_or_else(|| LayersError::Nothing { reason: "no ink is named".into() })?;
+        let mut art = art.ok_or_else(|| nothing("no ink is named"))?;
         art.opaque = Some(art.drawn.clone());
         art.notes.append(&mut notes);
         Ok(art)
     }
 
     /// A page as coverage.
-    fn layer(&self, leaf: &Leaf, dpi: (f64, f64)) -> Result<Scan, LayersError> {
+    fn layer(&self, leaf: &Leaf, dpi: (f64, f64)) -> Result<Scan, Diagnosis> {
         let drawn = draw::picture((self.path, self.interpreter), leaf.number, dpi, self.folder)?;
         let pixels = picture::read(&drawn, None)?;
         Ok(Scan::of_page(self.path, (pixels.width, pixels.height), &pixels.rgba))
     }
 
     /// The resolution at which a page has its final number of dots.
-    fn dpi(&self, leaf: &Leaf, notes: &mut Vec<String>) -> Result<(f64, f64), LayersError> {
+    fn dpi(&self, leaf: &Leaf, notes: &mut Vec<String>) -> Result<(f64, f64), Diagnosis> {
         let unstated = Unstated::Drawing { rounded_mm: leaf.rounded_mm };
         let dots = size::dots(self.path, leaf.size, Some((DRAFT, DRAFT)), unstated, self.options, notes)?;
         Ok((DRAFT * dots.0 as f64 / leaf.size.0, DRAFT * dots.1 as f64 / leaf.size.1))

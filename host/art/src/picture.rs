@@ -11,12 +11,13 @@ use std::path::{Path, PathBuf};
 
 use image::DynamicImage;
 use moxcms::{ColorProfile, DataColorSpace, Layout, TransformOptions};
+use observe::Diagnosis;
 use rayon::prelude::*;
 
 use super::artwork::Artwork;
 use super::colour::Colour;
 use super::decode::decode;
-use super::error::{LayersError, io, wrong};
+use super::error::{io, wrong};
 use super::options::Options;
 use super::size::{self, Unstated};
 use super::{bitplane, kinds, resample, reserved, scans};
@@ -35,7 +36,7 @@ pub(super) struct Pixels {
 }
 
 /// Reads a picture and converts its colours to sRGB; of a TIFF with several pages the one of this number.
-pub(super) fn read(path: &Path, page: Option<u32>) -> Result<Pixels, LayersError> {
+pub(super) fn read(path: &Path, page: Option<u32>) -> Result<Pixels, Diagnosis> {
     let file = File::open(path).map_err(io(path, "open it"))?;
     let decoded = decode(path, BufReader::new(file), page)?;
     let (width, height) = (decoded.image.width(), decoded.image.height());
@@ -125,7 +126,7 @@ pub(super) fn to_srgb(
     profile: &[u8],
     grey: bool,
     rgba: &mut [u8],
-) -> Result<Option<String>, LayersError> {
+) -> Result<Option<String>, Diagnosis> {
     let Ok(profile) = ColorProfile::new_from_slice(profile) else {
         return Ok(Some(format!("{}: its colour profile is damaged, so it is read as sRGB", path.display())));
     };
@@ -133,17 +134,14 @@ pub(super) fn to_srgb(
         DataColorSpace::Rgb => false,
         DataColorSpace::Gray if grey => true,
         other => {
-            return Err(wrong(
-                path,
-                format!(
-                    "its colour profile is for {other:?}, but its pixels are not; convert the picture to sRGB"
-                ),
-            ));
+            return Err(wrong(path, format!("its colour profile is for {other:?}, but its pixels are not"))
+                .hint("convert the picture to sRGB"));
         }
     };
     let srgb = ColorProfile::new_srgb();
-    let bad =
-        |error| wrong(path, format!("its colour profile cannot be applied ({error}); convert it to sRGB"));
+    let bad = |error| {
+        wrong(path, format!("its colour profile cannot be applied ({error})")).hint("convert it to sRGB")
+    };
     let layout = if of_grey { Layout::GrayAlpha } else { Layout::Rgba };
     let transform = profile
         .create_transform_8bit(layout, &srgb, Layout::Rgba, TransformOptions::default())
@@ -178,7 +176,7 @@ pub(super) fn tagged_artwork(
 }
 
 /// Art from one picture: reserved colours as layers if the options say so, the rest as colour.
-pub(super) fn artwork(name: &str, mut pixels: Pixels, options: &Options) -> Result<Artwork, LayersError> {
+pub(super) fn artwork(name: &str, mut pixels: Pixels, options: &Options) -> Result<Artwork, Diagnosis> {
     let sides = (f64::from(pixels.width), f64::from(pixels.height));
     let unstated = if options.reserved { Unstated::PixelPerDot } else { Unstated::FillRoom };
     let dots = size::dots(&pixels.path, sides, pixels.dpi, unstated, options, &mut pixels.notes)?;

@@ -7,8 +7,9 @@
 
 use std::path::Path;
 
-use super::error::{LayersError, wrong};
+use super::error::{beyond, no_size, too_large, too_small, wrong};
 use super::options::{Options, Room};
+use observe::Diagnosis;
 use pictures::resolution::Dpi;
 use sheet::Size;
 
@@ -22,17 +23,16 @@ pub(super) const MOST_BYTES: u64 = 1 << 30;
 pub(super) const MM: f64 = 25.4 / 600.0;
 
 /// Refuses absurd sizes before anything is allocated.
-pub(super) fn check_pixels(path: &Path, width: u32, height: u32) -> Result<(), LayersError> {
+pub(super) fn check_pixels(path: &Path, width: u32, height: u32) -> Result<(), Diagnosis> {
     if width == 0 || height == 0 {
         return Err(wrong(path, format!("the picture is {width} x {height} pixels; expected at least one")));
     }
     if u64::from(width) * u64::from(height) > MOST_PIXELS {
         return Err(wrong(
             path,
-            format!(
-                "the picture is {width} x {height} pixels, more than a page at 1200 dpi; make it smaller"
-            ),
-        ));
+            format!("the picture is {width} x {height} pixels, more than a page at 1200 dpi"),
+        )
+        .hint("make it smaller"));
     }
     Ok(())
 }
@@ -97,7 +97,7 @@ pub(super) fn dots(
     unstated: Unstated,
     options: &Options,
     notes: &mut Vec<String>,
-) -> Result<(usize, usize), LayersError> {
+) -> Result<(usize, usize), Diagnosis> {
     let inches = |(x, y): Dpi| (25.4 * pixels.0 / x, 25.4 * pixels.1 / y);
     let drawing = matches!(unstated, Unstated::Drawing { .. });
     let asked = options.dpi.filter(|_| !drawing);
@@ -115,13 +115,8 @@ pub(super) fn dots(
         (Some(Size { width, height: Some(height) }), _) => fit.within((width, height)),
         (None, Some(own)) => {
             if let (None, Some(stated), false) = (asked, stated, fit.accepts(own)) {
-                return Err(LayersError::Beyond {
-                    path: path.to_path_buf(),
-                    says: (!drawing).then_some(stated),
-                    size_mm: own,
-                    room_mm: fit.room,
-                    fits_mm: fit.largest().0,
-                });
+                let says = (!drawing).then_some(stated);
+                return Err(beyond(path, says, own, fit.room, fit.largest().0));
             }
             own
         }
@@ -138,7 +133,7 @@ fn without_resolution(
     unstated: Unstated,
     fit: &Fit,
     notes: &mut Vec<String>,
-) -> Result<Rectangle, LayersError> {
+) -> Result<Rectangle, Diagnosis> {
     let (size, assumed) = match unstated {
         Unstated::FillRoom => {
             let size = fit.largest();
@@ -148,13 +143,7 @@ fn without_resolution(
         Unstated::PixelPerDot | Unstated::Drawing { .. } => {
             let size = (25.4 * pixels.0 / 600.0, 25.4 * pixels.1 / 600.0);
             if !fit.accepts(size) {
-                return Err(LayersError::NoSize {
-                    path: path.to_path_buf(),
-                    pixels: (pixels.0 as u32, pixels.1 as u32),
-                    size_mm: size,
-                    room_mm: fit.room,
-                    fits_mm: fit.largest().0,
-                });
+                return Err(no_size(path, pixels, size, fit.room, fit.largest().0));
             }
             (size, format!("at 600 dpi, {:.1} x {:.1} mm", size.0, size.1))
         }
@@ -166,22 +155,15 @@ fn without_resolution(
     Ok(size)
 }
 
-fn to_dots((width_mm, height_mm): Rectangle, fit: &Fit) -> Result<(usize, usize), LayersError> {
+fn to_dots((width_mm, height_mm): Rectangle, fit: &Fit) -> Result<(usize, usize), Diagnosis> {
     let (across, down) = ((width_mm / MM).round(), (height_mm / MM).round());
     if !(across >= 1.0 && down >= 1.0) {
-        return Err(LayersError::TooSmall { width_mm, height_mm });
+        return Err(too_small(width_mm, height_mm));
     }
     let most = halftone::LARGEST_MAP;
     let most = (f64::from(most.0), f64::from(most.1));
     if across > most.0 || down > most.1 {
-        let (most_width_mm, most_height_mm) = (most.0 * MM, most.1 * MM);
-        return Err(LayersError::TooLarge {
-            width_mm,
-            height_mm,
-            most_width_mm,
-            most_height_mm,
-            fits_mm: fit.largest().0,
-        });
+        return Err(too_large((width_mm, height_mm), (most.0 * MM, most.1 * MM), fit.largest().0));
     }
     Ok((across as usize, down as usize))
 }

@@ -28,7 +28,7 @@ use resvg::usvg::roxmltree;
 
 use super::artwork::Artwork;
 use super::coverage::{Coverage, Scan};
-use super::error::{LayersError, io, wrong};
+use super::error::{io, nothing, wrong};
 use super::names::stem;
 use super::options::Options;
 use super::picture;
@@ -36,7 +36,7 @@ use super::size::{self, Unstated};
 use super::svg_kinds;
 use crate::process;
 use find::Layer;
-use observe::Observer;
+use observe::{Diagnosis, Observer};
 use render::{Renderer, Without};
 use write::Way;
 
@@ -52,7 +52,7 @@ const MOST_BYTES: u64 = 1 << 28;
 const UNITS: f64 = 96.0;
 
 /// Reads a drawing.
-pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, LayersError> {
+pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, Diagnosis> {
     let reading = io(path, "read it");
     if std::fs::metadata(path).map_err(&reading)?.len() > MOST_BYTES {
         return Err(wrong(path, format!("the drawing is larger than {} MB", MOST_BYTES >> 20)));
@@ -76,10 +76,8 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
             Ok(Some(art)) => break art,
             Err(RecvTimeoutError::Timeout) => break Err(wrong(path, process::too_long(limit))),
             Err(RecvTimeoutError::Disconnected) => {
-                break Err(wrong(
-                    path,
-                    "the drawing cannot be rendered; simplify its filters, or export it as PNG",
-                ));
+                break Err(wrong(path, "the drawing cannot be rendered")
+                    .hint("simplify its filters, or export it as PNG"));
             }
         }
     };
@@ -88,22 +86,22 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
 }
 
 /// The elements of a drawing.
-fn parsed<'a>(path: &Path, text: &'a str) -> Result<roxmltree::Document<'a>, LayersError> {
+fn parsed<'a>(path: &Path, text: &'a str) -> Result<roxmltree::Document<'a>, Diagnosis> {
     let options = roxmltree::ParsingOptions { allow_dtd: true, ..Default::default() };
     roxmltree::Document::parse_with_options(text, options).map_err(|error| {
-        let remedy = match &error {
-            roxmltree::Error::UnknownNamespace(prefix, _) => format!(
-                "; open the drawing in Inkscape and save it again, or declare the prefix in its first element{}",
+        let diagnosis = wrong(path, format!("the drawing cannot be read: {error}"));
+        match &error {
+            roxmltree::Error::UnknownNamespace(prefix, _) => diagnosis.hint(format!(
+                "open the drawing in Inkscape and save it again, or declare the prefix in its first element{}",
                 match prefix.as_str() {
                     "inkscape" => ": xmlns:inkscape=\"http://www.inkscape.org/namespaces/inkscape\"",
                     "sodipodi" => ": xmlns:sodipodi=\"http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd\"",
                     "xlink" => ": xmlns:xlink=\"http://www.w3.org/1999/xlink\"",
                     _ => "",
                 }
-            ),
-            _ => String::new(),
-        };
-        wrong(path, format!("the drawing cannot be read: {error}{remedy}"))
+            )),
+            _ => diagnosis,
+        }
     })
 }
 
@@ -118,7 +116,7 @@ struct Drawing {
 
 impl Drawing {
     /// Renders it, and calls `advance` after each layer.
-    fn draw(self, advance: &dyn Fn()) -> Result<Artwork, LayersError> {
+    fn draw(self, advance: &dyn Fn()) -> Result<Artwork, Diagnosis> {
         let Drawing { path, text, layers, mut notes, options } = self;
         let path = path.as_path();
         let document = parsed(path, &text)?;
@@ -187,11 +185,8 @@ impl Drawing {
             art.add(scan, &layer.label, layer.named, false, &options);
         }
         if art.layers.is_empty() {
-            let reason = format!(
-                "no layer of {} is visible; show its layers in the drawing program, or draw something in them",
-                path.display()
-            );
-            return Err(LayersError::Nothing { reason });
+            return Err(nothing(format!("no layer of {} is visible", path.display()))
+                .hint("show its layers in the drawing program, or draw something in them"));
         }
         art.opaque = Some(art.drawn.clone());
         art.notes.append(&mut notes);

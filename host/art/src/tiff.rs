@@ -18,13 +18,14 @@ use ::tiff::tags::Tag;
 use super::artwork::Artwork;
 use super::cmyk::{self, PLATES};
 use super::coverage::{Coverage, Scan};
-use super::error::{LayersError, NamedPart, io, wrong};
+use super::error::{NamedPart, io, wrong};
 use super::names::{self, stem};
 use super::options::Options;
 use super::orientation::Turn;
 use super::picture::{self, Pixels};
 use super::size::{self, MOST_BYTES, Unstated};
 use super::tiff_pages;
+use observe::Diagnosis;
 use pictures::resolution::{TiffDecoder, of_tiff, tiff_decoder};
 
 const INK_SET: Tag = Tag::Unknown(332);
@@ -71,7 +72,7 @@ impl Opacity {
 }
 
 /// Reads a TIFF with plates or spot channels; `None` if it is a plain picture.
-pub(super) fn read(path: &Path, options: &Options) -> Result<Option<Artwork>, LayersError> {
+pub(super) fn read(path: &Path, options: &Options) -> Result<Option<Artwork>, Diagnosis> {
     let reading = io(path, "read it");
     if std::fs::metadata(path).map_err(&reading)?.len() > MOST_BYTES {
         return Err(wrong(path, "the file is larger than a gigabyte"));
@@ -199,7 +200,7 @@ fn channels(
     named: &Names,
     photometric: u16,
     notes: &mut Vec<String>,
-) -> Result<Vec<Channel>, LayersError> {
+) -> Result<Vec<Channel>, Diagnosis> {
     let mut channels = Vec::new();
     // Opacity may be among Photoshop's names or not.
     let all_named = named.extra.len() >= samples - base;
@@ -223,13 +224,7 @@ fn channels(
                 continue;
             }
             _ => {
-                return Err(wrong(
-                    path,
-                    format!(
-                        "channel {} of {samples} has no name; name every spot channel after its ink, such as white or gold",
-                        at + 1
-                    ),
-                ));
+                return Err(wrong(path, format!("channel {} of {samples} has no name", at + 1)));
             }
         };
         let ink = names::of_part(path, name, NamedPart::Channel, notes)?;
@@ -334,12 +329,10 @@ fn field(bytes: &[u8], tag: u16) -> Option<std::ops::Range<usize>> {
 }
 
 /// One byte a pixel for each channel.
-fn planes(path: &Path, bytes: &[u8], samples: usize, pixels: usize) -> Result<Vec<Vec<u8>>, LayersError> {
+fn planes(path: &Path, bytes: &[u8], samples: usize, pixels: usize) -> Result<Vec<Vec<u8>>, Diagnosis> {
     let bad = |error: ::tiff::TiffError| {
-        wrong(
-            path,
-            format!("cannot decode its channels: {error}; save it uncompressed or with LZW, 8 or 16 bits"),
-        )
+        wrong(path, format!("cannot decode its channels: {error}"))
+            .hint("save it uncompressed or with LZW, 8 or 16 bits")
     };
     let Some(mut decoder) = tiff_decoder(bytes) else { return Err(wrong(path, "the file is damaged")) };
     let mut decoded = DecodingResult::U8(Vec::new());
@@ -347,13 +340,11 @@ fn planes(path: &Path, bytes: &[u8], samples: usize, pixels: usize) -> Result<Ve
     let values: Vec<u8> = match decoded {
         DecodingResult::U8(values) => values,
         DecodingResult::U16(values) => values.into_iter().map(|v| (v >> 8) as u8).collect(),
-        _ => return Err(wrong(path, "its channels have neither 8 nor 16 bits; save it with 8 bits")),
+        _ => return Err(wrong(path, "its channels have neither 8 nor 16 bits").hint("save it with 8 bits")),
     };
     if values.len() != samples * pixels {
-        return Err(wrong(
-            path,
-            "it has fewer channels than its header states; save it with interleaved channels of 8 bits",
-        ));
+        return Err(wrong(path, "it has fewer channels than its header states")
+            .hint("save it with interleaved channels of 8 bits"));
     }
     let planar = decoder.find_tag_unsigned::<u16>(Tag::PlanarConfiguration).ok().flatten() == Some(2);
     let plane = |c: usize| -> Vec<u8> {

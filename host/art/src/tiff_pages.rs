@@ -9,8 +9,9 @@
 
 use std::path::Path;
 
-use super::error::{LayersError, wrong};
+use super::error::{several_pages, wrong};
 use crate::process::MOST_PAGES;
+use observe::Diagnosis;
 
 const NEW_SUBFILE_TYPE: u16 = 254;
 const SUBFILE_TYPE: u16 = 255;
@@ -76,7 +77,7 @@ pub(super) fn count(bytes: &[u8]) -> usize {
 ///
 /// # Errors
 /// Several pages and no number, or no page of this number.
-pub(super) fn choose(path: &Path, bytes: &mut [u8], page: Option<u32>) -> Result<(), LayersError> {
+pub(super) fn choose(path: &Path, bytes: &mut [u8], page: Option<u32>) -> Result<(), Diagnosis> {
     let pages = directories(bytes);
     if pages.is_empty() {
         return Ok(());
@@ -84,8 +85,8 @@ pub(super) fn choose(path: &Path, bytes: &mut [u8], page: Option<u32>) -> Result
     let at = match page {
         None if pages.len() == 1 => 0,
         None => {
-            let pages = (1..).take(pages.len()).collect();
-            return Err(LayersError::Pages { path: path.to_path_buf(), pages });
+            let pages: Vec<u32> = (1..).take(pages.len()).collect();
+            return Err(several_pages(path, &pages));
         }
         Some(number) => number.checked_sub(1).map_or(usize::MAX, |at| at as usize),
     };

@@ -145,8 +145,12 @@ mod tests {
 
     /// The long names of the options that a help lists, in its order.
     fn listed(help: &str) -> Vec<&str> {
-        let options = help.lines().map(str::trim_start).filter(|line| line.starts_with('-'));
-        let long = options.filter_map(|line| line.split_once("--").map(|(_, rest)| rest));
+        // Descriptions, which may begin a line with an option, stand further to the right.
+        let options = help
+            .lines()
+            .map(|line| (line, line.trim_start()))
+            .filter(|(line, text)| [2, 6].contains(&(line.len() - text.len())) && text.starts_with('-'));
+        let long = options.filter_map(|(_, text)| text.split_once("--").map(|(_, rest)| rest));
         long.map(|rest| rest.split([' ', '=']).next().unwrap_or(rest)).collect()
     }
 
@@ -158,10 +162,6 @@ mod tests {
             let help = command.render_help().to_string();
             let lines = help.trim_end().lines().count();
             assert!(lines <= 40, "foilpress {path} -h has {lines} lines:\n{help}");
-            assert!(
-                help.contains("\nExamples:") || help.contains("\nExample:") || lines < 30,
-                "{path} has examples:\n{help}"
-            );
             if let Some((_, first)) = FIRST.iter().find(|(known, _)| *known == path) {
                 assert!(first.len() <= 8, "{path}");
                 assert_eq!(listed(&help)[..first.len()], **first, "{path}:\n{help}");

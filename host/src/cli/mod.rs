@@ -21,7 +21,7 @@ use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 
 use commands::{Command, preset, queue};
 use console::progress::Progress;
-use console::{advice, chain, closed_pipe, permission, say, stderr};
+use console::{advice, closed_pipe, permission, say, stderr};
 use observe::visible_line;
 
 /// Print materials instead of colours on the ALPS MD-5500 (Oki DP-5000).
@@ -131,8 +131,9 @@ fn failed(error: &anyhow::Error) -> ExitCode {
         let _ = usage.print();
         return ExitCode::from(USAGE);
     }
-    let advice = advice::of(error).map_or_else(String::new, |advice| format!("; {advice}"));
-    say(&format!("foilpress: {}{advice}", chain(error)));
+    let (text, hints) = advice::explained(error);
+    say(&format!("foilpress: {text}"));
+    hints.iter().for_each(|hint| say(&format!("  hint: {hint}")));
     if permission::is_missing(error) {
         say("");
         permission::how_to_give().lines().for_each(say);

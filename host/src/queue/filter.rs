@@ -6,7 +6,7 @@
 //! else is halftoned in process inks. A page with spot colours that name inks is separated, too, and the plates of these are
 //! layers. The art is laid where the page has it, or where the user wants it, on a sheet of the page's size; what lies on the
 //! margins is reported in millimetres.
-//! Cost: the page at a bit or four bytes a pixel, and what [`layers`] costs; for documents that may have spot colours, one
+//! Cost: the page at a bit or four bytes a pixel, and what [`art`] costs; for documents that may have spot colours, one
 //! more drawing of all pages at a low resolution; for those that may have gradients that Ghostscript leaves out, a run
 //! without output.
 //! Limits: documents of 1 GB and 1000 pages, sheets the printer takes, upright. Transparency is gone when a page has been
@@ -27,11 +27,11 @@ use tempfile::NamedTempFile;
 
 use super::options::{Choices, NoChoice, Spots};
 use super::raster::{self, RasterError};
+use art::Page;
 use art::pdf::{Interpreter, Survey};
 use art::process::MOST_PAGES;
-use art::{LayersError, Page};
 use drawing::Drawing;
-use observe::Observer;
+use observe::{Diagnosis, Fault, Observer};
 use page::Press;
 use press::pipeline::JobError;
 
@@ -105,19 +105,19 @@ pub enum FilterError {
     TooManyPages,
     /// The plates of a document.
     #[error("cannot read the document's spot colours")]
-    Plates(#[source] LayersError),
+    Plates(#[source] Diagnosis),
     /// A spot colour of which it is not clear whether it names an ink.
     #[error(
         "a spot colour of the document may be meant as an ink; FoilpressSpots=Off prints it in process inks"
     )]
-    Spot(#[source] LayersError),
+    Spot(#[source] Diagnosis),
     /// The art.
     #[error("page {page} cannot be printed")]
     Layers {
         /// Page, from 1.
         page: usize,
         /// What is the matter.
-        source: LayersError,
+        source: Diagnosis,
     },
     /// A page with more inks than the printer holds.
     #[error(
@@ -227,7 +227,7 @@ fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
         Spots::None => whole(Interpreter::Usual),
         _ if suspected.spots => {
             art::pdf::survey(path, press.observer).map_err(|error| match of_document(error) {
-                error @ LayersError::UnknownInk { .. } => FilterError::Spot(error),
+                error if error.fault() == Fault::Name => FilterError::Spot(error),
                 error => FilterError::Plates(error),
             })?
         }
@@ -260,14 +260,8 @@ fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
 }
 
 /// An error without the name of the file where the document is kept, which its owner never sees.
-fn of_document(mut error: LayersError) -> LayersError {
-    if let LayersError::Io { path, .. }
-    | LayersError::File { path, .. }
-    | LayersError::UnknownInk { path, .. } = &mut error
-    {
-        *path = "this document".into();
-    }
-    error
+fn of_document(error: Diagnosis) -> Diagnosis {
+    error.calling_it("this document")
 }
 
 /// Refuses a document that shows pages for ever.

@@ -1,9 +1,9 @@
 //! The order of the layers: as listed in the settings, as numbered in their names, or by the ink library's rules.
 
 use inks::Library;
+use observe::Diagnosis;
 use protocol::ink::Ink;
 
-use super::super::error::{LayersError, Setting};
 use super::super::order;
 use super::slot::Slot;
 
@@ -22,11 +22,7 @@ pub enum Order {
 }
 
 /// The slots from the paper up.
-pub(super) fn arranged(
-    slots: Vec<Slot>,
-    wanted: &Order,
-    library: &Library,
-) -> Result<Vec<Slot>, LayersError> {
+pub(super) fn arranged(slots: Vec<Slot>, wanted: &Order, library: &Library) -> Result<Vec<Slot>, Diagnosis> {
     let numbered = slots.iter().all(|slot| slot.place.is_some());
     let twice = (1..slots.len()).find(|&i| slots[..i].iter().any(|slot| slot.ink == slots[i].ink));
     let mut slots = slots;
@@ -37,16 +33,11 @@ pub(super) fn arranged(
             if let Some(twice) = twice {
                 let same = slots.iter().filter(|slot| slot.ink == slots[twice].ink);
                 let same: Vec<&str> = same.map(|slot| slot.from.as_str()).collect();
-                return Err(LayersError::Setting {
-                    setting: Setting::Order,
-                    problem: format!(
-                        "{} layers are {} ({}); merge them, number the names of all layers from the paper up (01-white, \
-                         02-black, 03-white), or keep the given order",
-                        same.len(),
-                        slots[twice].ink.name(),
-                        same.join(", ")
-                    ),
-                });
+                let problem =
+                    format!("{} layers are {} ({})", same.len(), slots[twice].ink.name(), same.join(", "));
+                let remedy = "merge them, number the names of all layers from the paper up (01-white, 02-black, 03-white), or \
+                              keep the given order";
+                return Err(Diagnosis::of_setting("order", problem).hint(remedy).set("order", "given"));
             }
             let inks: Vec<Ink> = slots.iter().map(|slot| slot.ink).collect();
             let order = order::by_rules(&inks, library);
@@ -58,8 +49,8 @@ pub(super) fn arranged(
 }
 
 /// The slots as listed. If an ink is listed more often than it has layers, its last layer is repeated.
-fn in_order(slots: Vec<Slot>, order: &[Ink]) -> Result<Vec<Slot>, LayersError> {
-    let wrong = |problem: String| Err(LayersError::Setting { setting: Setting::Order, problem });
+fn in_order(slots: Vec<Slot>, order: &[Ink]) -> Result<Vec<Slot>, Diagnosis> {
+    let wrong = |problem: String| Err(Diagnosis::of_setting("order", problem));
     if let Some(slot) = slots.iter().find(|slot| !order.contains(&slot.ink)) {
         return wrong(format!("{} ({}) is not in the list", slot.ink.name(), slot.from));
     }

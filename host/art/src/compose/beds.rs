@@ -1,9 +1,9 @@
 //! White beneath the art and finish on it, as the settings say.
 
+use observe::Diagnosis;
 use protocol::ink::{Ink, Kind};
 
 use super::super::artwork::Artwork;
-use super::super::error::{LayersError, Setting};
 use super::super::size::MM;
 use super::super::white::{self, White};
 use super::super::{bitplane, distance};
@@ -20,10 +20,10 @@ pub(super) fn lay_white(
     art: &Artwork,
     settings: &Settings,
     tell: &mut dyn FnMut(String),
-) -> Result<(), LayersError> {
+) -> Result<(), Diagnosis> {
     if let Some((mode, mut bed)) = white_bed(slots, art, settings)? {
         if !settings.inks.contains(Ink::White) {
-            return refused(Setting::White, "white is not among the allowed inks");
+            return refused("white", "white is not among the allowed inks");
         }
         // The art's own white becomes part of the bed, so that there is one layer of white.
         if let Some(at) = slots.iter().position(|slot| slot.ink == Ink::White) {
@@ -41,14 +41,14 @@ fn white_bed(
     slots: &[Slot],
     art: &Artwork,
     settings: &Settings,
-) -> Result<Option<(White, Plane)>, LayersError> {
+) -> Result<Option<(White, Plane)>, Diagnosis> {
     let Some(mode) = settings.white else { return Ok(None) };
     let bed = match mode {
         White::None => return Ok(None),
         White::Reserved => {
             if !slots.iter().any(|slot| slot.ink == Ink::White) {
                 return refused(
-                    Setting::White,
+                    "white",
                     "the picture has no reserved white; draw what is to be white in exactly 230,230,230",
                 );
             }
@@ -73,7 +73,7 @@ fn white_bed(
                      white mode opaque or silhouette",
                     art.name
                 );
-                return refused(Setting::White, problem);
+                return refused("white", problem);
             }
         },
     };
@@ -81,11 +81,11 @@ fn white_bed(
 }
 
 /// Shrinks all white by so many dots, or spreads it if the number is negative.
-fn choke(slots: &mut [Slot], choke: f64, tell: &mut dyn FnMut(String)) -> Result<(), LayersError> {
+fn choke(slots: &mut [Slot], choke: f64, tell: &mut dyn FnMut(String)) -> Result<(), Diagnosis> {
     if choke == 0.0 {
         return Ok(());
     }
-    let setting = if choke > 0.0 { Setting::Choke } else { Setting::Spread };
+    let setting = if choke > 0.0 { "choke" } else { "spread" };
     let radius = choke.abs();
     // What is typed as 10 mm may be a little more in dots.
     if radius.is_nan() || radius * MM > MOST_CHOKE_MM + 1e-9 {
@@ -114,16 +114,12 @@ fn choke(slots: &mut [Slot], choke: f64, tell: &mut dyn FnMut(String)) -> Result
     Ok(())
 }
 
-fn refused<T>(setting: Setting, problem: impl Into<String>) -> Result<T, LayersError> {
-    Err(LayersError::Setting { setting, problem: problem.into() })
+fn refused<T>(setting: &'static str, problem: impl std::fmt::Display) -> Result<T, Diagnosis> {
+    Err(Diagnosis::of_setting(setting, problem))
 }
 
 /// Adds finish.
-pub(super) fn lay_finish(
-    slots: &mut Vec<Slot>,
-    art: &Artwork,
-    settings: &Settings,
-) -> Result<(), LayersError> {
+pub(super) fn lay_finish(slots: &mut Vec<Slot>, art: &Artwork, settings: &Settings) -> Result<(), Diagnosis> {
     let coat = match settings.finish {
         None | Some(Finish::None) => return Ok(()),
         Some(Finish::Artwork) => {
@@ -134,7 +130,7 @@ pub(super) fn lay_finish(
         Some(Finish::All) => bitplane::full(art.width, art.length),
     };
     if !settings.inks.contains(Ink::Finish) {
-        return refused(Setting::Finish, "finish is not among the allowed inks");
+        return refused("finish", "finish is not among the allowed inks");
     }
     match slots.iter_mut().find(|slot| slot.ink == Ink::Finish) {
         Some(slot) => bitplane::add(&mut slot.plane, &coat),

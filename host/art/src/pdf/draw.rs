@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use super::super::coverage;
-use super::super::error::{LayersError, io, wrong};
+use super::super::error::{io, no_program, wrong};
 use super::super::kinds;
 use super::super::names::stem;
 use super::super::size::check_pixels;
@@ -20,6 +20,7 @@ use super::ghostscript::{self, Interpreter};
 use super::{complaint, conversion};
 use crate::process::{self, MOST_PAGES, Process, ProcessError};
 use files::scratch::Scratch;
+use observe::Diagnosis;
 
 /// Resolution of drafts.
 pub(super) const DRAFT: f64 = 36.0;
@@ -81,7 +82,7 @@ pub(super) fn picture(
     page: u32,
     dpi: (f64, f64),
     folder: &Scratch,
-) -> Result<PathBuf, LayersError> {
+) -> Result<PathBuf, Diagnosis> {
     let picture = folder.path().join("page.png");
     let options = [one_page(page), crop(path, Part::CropBox)?].concat();
     ghostscript((path, interpreter), &options, "pngalpha", dpi, &picture, || false)?;
@@ -97,7 +98,7 @@ pub(super) fn drafts(
     only: Option<u32>,
     part: Part,
     folder: &Scratch,
-) -> Result<(Drafts, Interpreter), LayersError> {
+) -> Result<(Drafts, Interpreter), Diagnosis> {
     let usual = leaves((path, Interpreter::Usual), only, part, folder)?;
     if complaint::lacks_pattern(&usual.said) {
         let again = Scratch::new().map_err(io(path, "make a folder for its pages"))?;
@@ -130,7 +131,7 @@ pub(super) fn tagged(
     part: Part,
     dpi: (f64, f64),
     folder: &Scratch,
-) -> Result<Tagged, LayersError> {
+) -> Result<Tagged, Diagnosis> {
     let picture = folder.path().join("page.pam");
     conversion::write(folder.path()).map_err(io(path, "keep the conversion of its colours"))?;
     let convert = conversion::OPTIONS.map(String::from).to_vec();
@@ -153,7 +154,7 @@ fn one_page(page: u32) -> Vec<String> {
     vec![format!("-dFirstPage={page}"), format!("-dLastPage={page}")]
 }
 
-fn crop(path: &Path, part: Part) -> Result<Vec<String>, LayersError> {
+fn crop(path: &Path, part: Part) -> Result<Vec<String>, Diagnosis> {
     if part == Part::Sheet {
         return Ok(Vec::new());
     }
@@ -177,7 +178,7 @@ fn leaves(
     only: Option<u32>,
     part: Part,
     folder: &Scratch,
-) -> Result<Drafts, LayersError> {
+) -> Result<Drafts, Diagnosis> {
     let place = |number: u32| match only {
         Some(_) => folder.path().join("draft.tif"),
         None => folder.path().join(format!("draft{number}.tif")),
@@ -198,7 +199,9 @@ fn leaves(
     };
     let said = ghostscript((path, interpreter), &options, "tiffsep", (DRAFT, DRAFT), &to, progressed);
     if only.is_none() && place(MOST_PAGES + 1).exists() {
-        return Err(wrong(path, format!("it has more than {MOST_PAGES} pages; print one with --page")));
+        return Err(wrong(path, format!("it has more than {MOST_PAGES} pages"))
+            .hint("print one of them")
+            .set("page", "1"));
     }
     let said = said?;
     let mut plates = plates(path, folder)?;
@@ -245,12 +248,12 @@ fn exact(draft: (f64, f64), stated: Option<&(f64, f64)>) -> Option<(f64, f64)> {
 }
 
 /// The names and files of the plates beside a separated page, such as `page(Gold Foil).tif` or `page(Wei%DF).tif`.
-pub(super) fn plates_beside(page: &Path, folder: &Scratch) -> Result<Vec<(String, PathBuf)>, LayersError> {
+pub(super) fn plates_beside(page: &Path, folder: &Scratch) -> Result<Vec<(String, PathBuf)>, Diagnosis> {
     Ok(plates(page, folder)?.remove(&stem(page)).unwrap_or_default())
 }
 
 /// The plates of all separated pages, by the name of the page.
-fn plates(path: &Path, folder: &Scratch) -> Result<HashMap<String, Vec<(String, PathBuf)>>, LayersError> {
+fn plates(path: &Path, folder: &Scratch) -> Result<HashMap<String, Vec<(String, PathBuf)>>, Diagnosis> {
     let mut plates: HashMap<String, Vec<(String, PathBuf)>> = HashMap::new();
     for entry in std::fs::read_dir(folder.path()).map_err(io(path, "list its plates"))? {
         let file = entry.map_err(io(path, "list its plates"))?.path();
@@ -291,7 +294,7 @@ pub(super) fn separate(
     part: Part,
     dpi: (f64, f64),
     to: &Path,
-) -> Result<String, LayersError> {
+) -> Result<String, Diagnosis> {
     let options = [one_page(page), crop(path, part)?, vec!["-dPrintSpotCMYK".into(), SPOTS.into()]].concat();
     ghostscript((path, interpreter), &options, "tiffsep", dpi, to, || false)
 }
@@ -304,7 +307,7 @@ fn ghostscript(
     dpi: (f64, f64),
     to: &Path,
     progressed: impl FnMut() -> bool,
-) -> Result<String, LayersError> {
+) -> Result<String, Diagnosis> {
     let drawing = [
         "-dTextAlphaBits=1".into(),
         "-dGraphicsAlphaBits=1".into(),
@@ -319,26 +322,32 @@ fn ghostscript(
 }
 
 /// Runs a program to its end and returns what it said.
-fn run(path: &Path, mut command: Command, progressed: impl FnMut() -> bool) -> Result<String, LayersError> {
+fn run(path: &Path, mut command: Command, progressed: impl FnMut() -> bool) -> Result<String, Diagnosis> {
     let begun = Process::start(command.stdout(Stdio::null()), process::limit());
     begun.and_then(|process| process.end(progressed)).map_err(|error| failed(path, error))
 }
 
+/// What Ghostscript says of a file that it does not find.
+const NOT_FOUND: &str = "/undefinedfilename";
+
 /// Why a document cannot be drawn.
-fn failed(path: &Path, error: ProcessError) -> LayersError {
+fn failed(path: &Path, error: ProcessError) -> Diagnosis {
     match error {
         ProcessError::Start(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            LayersError::Program { path: path.to_path_buf(), program: "Ghostscript", install: NO_GHOSTSCRIPT }
+            no_program(path, "Ghostscript", NO_GHOSTSCRIPT)
         }
-        ProcessError::Start(source) => {
-            LayersError::Io { path: path.to_path_buf(), attempt: "start a program to read it", source }
+        ProcessError::Start(source) => io(path, "start a program to read it")(source),
+        ProcessError::Io(source) => io(path, "wait for the program that reads it")(source),
+        ProcessError::Failed(why) => {
+            let diagnosis = wrong(path, format!("cannot be read: {why}"));
+            if path.to_str().is_none() && why.contains(NOT_FOUND) {
+                diagnosis.hint(
+                    "the name of the file is not UTF-8, so Ghostscript does not find it; rename the file",
+                )
+            } else {
+                diagnosis
+            }
         }
-        ProcessError::Io(source) => LayersError::Io {
-            path: path.to_path_buf(),
-            attempt: "wait for the program that reads it",
-            source,
-        },
-        ProcessError::Failed(why) => wrong(path, format!("cannot be read: {why}")),
         error @ (ProcessError::TooLong(_) | ProcessError::TooLongAltogether(_)) => {
             wrong(path, error.to_string())
         }

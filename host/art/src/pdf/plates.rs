@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 use super::super::artwork::Artwork;
 use super::super::coverage::{self, Coverage, Scan};
-use super::super::error::{LayersError, NamedPart, io, wrong};
+use super::super::error::{NamedPart, io, unknown_ink, wrong};
 use super::super::names::{self, Named};
 use super::super::options::Options;
 use super::super::size;
@@ -28,7 +28,7 @@ use super::super::{kinds, picture};
 use super::draw::{PROCESS, Part, Tagged, drafts, plates_beside, separate, tagged};
 use super::ghostscript::Interpreter;
 use files::scratch::Scratch;
-use observe::Observer;
+use observe::{Diagnosis, Observer};
 
 /// Full ink in what Ghostscript says of a spot.
 const FULL: f64 = 32760.0;
@@ -43,14 +43,11 @@ fn layer(
     place: &dyn Display,
     spot: &str,
     notes: &mut Vec<String>,
-) -> Result<Option<Named>, LayersError> {
+) -> Result<Option<Named>, Diagnosis> {
     match names::ink(spot) {
         Some(named) => Ok(Some(named).filter(|named| named.ink.kind() != Kind::Process)),
         None => match names::closest(spot) {
-            suggestion @ Some(_) => {
-                let (path, part) = (path.to_path_buf(), NamedPart::Spot);
-                Err(LayersError::UnknownInk { path, part, name: spot.into(), suggestion })
-            }
+            suggestion @ Some(_) => Err(unknown_ink(path, NamedPart::Spot, spot, suggestion)),
             None => {
                 notes.push(format!(
                     "{place}: spot colour `{spot}` names no ink: printed by its process colours"
@@ -67,7 +64,7 @@ pub(super) fn layers(
     place: &dyn Display,
     spots: &[String],
     notes: &mut Vec<String>,
-) -> Result<Vec<String>, LayersError> {
+) -> Result<Vec<String>, Diagnosis> {
     let mut found = Vec::new();
     for spot in spots {
         if layer(path, place, spot, notes)?.is_some() {
@@ -89,7 +86,7 @@ pub struct Survey {
 ///
 /// # Errors
 /// A document that Ghostscript cannot read, no Ghostscript, or a name that resembles that of an ink.
-pub fn survey(path: &Path, observer: &dyn Observer) -> Result<Survey, LayersError> {
+pub fn survey(path: &Path, observer: &dyn Observer) -> Result<Survey, Diagnosis> {
     let folder = Scratch::new().map_err(io(path, "make a folder for its plates"))?;
     let (drafts, interpreter) = drafts(path, None, Part::Sheet, &folder)?;
     let mut notes = Vec::new();
@@ -122,7 +119,7 @@ pub fn separated(
     interpreter: Interpreter,
     page: usize,
     dpi: f64,
-) -> Result<Separated, LayersError> {
+) -> Result<Separated, Diagnosis> {
     let page = u32::try_from(page).map_err(|_| wrong(path, format!("there is no page {page}")))?;
     separated_part((path, interpreter), page, Part::Sheet, (dpi, dpi))
 }
@@ -132,7 +129,7 @@ pub(super) fn separated_part(
     page: u32,
     part: Part,
     dpi: (f64, f64),
-) -> Result<Separated, LayersError> {
+) -> Result<Separated, Diagnosis> {
     let folder = Scratch::new().map_err(io(path, "make a folder for its plates"))?;
     let full = folder.path().join("page.tif");
     let said = separate((path, interpreter), page, part, dpi, &full)?;
@@ -241,7 +238,7 @@ impl Separated {
     ///
     /// # Errors
     /// A window of no dots, or of more than 65535 on a side.
-    pub fn art(self, name: &str, window: &Window, options: &Options) -> Result<Artwork, LayersError> {
+    pub fn art(self, name: &str, window: &Window, options: &Options) -> Result<Artwork, Diagnosis> {
         let empty = || wrong(Path::new(name), "the window has no dots");
         let dots = size::page_dots((window.width, window.height), self.dpi).ok_or_else(empty)?;
         Ok(self.art_of(name, window, dots, options))

@@ -12,10 +12,11 @@ use std::path::Path;
 
 use resvg::usvg::roxmltree::{Document, NodeId};
 
-use super::super::error::{LayersError, NamedPart, wrong};
+use super::super::error::{NamedPart, unknown_ink, wrong};
 use super::super::names::{self, Named};
 use super::nodes::{self, Node};
 use super::write::Way;
+use observe::Diagnosis;
 
 /// The most layers that are looked for: more than a sheet can have.
 const MOST_LAYERS: usize = 64;
@@ -45,7 +46,7 @@ pub(super) fn layers(
     path: &Path,
     document: &Document<'_>,
     notes: &mut Vec<String>,
-) -> Result<Vec<Layer>, LayersError> {
+) -> Result<Vec<Layer>, Diagnosis> {
     let mut layers: Vec<Layer> = Vec::new();
     // Of several elements with one identifier the first counts, as in the renderer.
     let mut ids: HashMap<&str, Node> = HashMap::new();
@@ -88,9 +89,8 @@ pub(super) fn layers(
                 }
             }
             if layers.len() > MOST_LAYERS {
-                let problem =
-                    format!("the drawing has more than {MOST_LAYERS} layers of ink; merge those of one ink");
-                return Err(wrong(path, problem));
+                let problem = format!("the drawing has more than {MOST_LAYERS} layers of ink");
+                return Err(wrong(path, problem).hint("merge those of one ink"));
             }
             within = Some(at);
         } else if within.is_none() && is_layer(node) {
@@ -130,8 +130,7 @@ pub(super) fn layers(
     } else {
         for name in slips {
             if let suggestion @ Some(_) = names::closest(&name) {
-                let (path, part) = (path.to_path_buf(), NamedPart::Layer);
-                return Err(LayersError::UnknownInk { path, part, name, suggestion });
+                return Err(unknown_ink(path, NamedPart::Layer, &name, suggestion));
             }
         }
         if let Some(note) = left_out(path, document, &layers) {

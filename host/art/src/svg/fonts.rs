@@ -14,8 +14,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use resvg::usvg::{Font, FontFamily, FontResolver, fontdb};
 
-use super::super::error::{LayersError, wrong};
+use super::super::error::wrong;
 use crate::process::{self, Process};
+use observe::Diagnosis;
 
 /// The most lists of families that fontconfig is asked for: no drawing of a person has more.
 const MOST: usize = 64;
@@ -46,7 +47,7 @@ impl Fonts {
 
     /// Loads the fonts. The renderer draws text of a missing family in the default family and leaves it out if that is missing
     /// too, so one is chosen here.
-    pub fn load(path: &Path) -> Result<Fonts, LayersError> {
+    pub fn load(path: &Path) -> Result<Fonts, Diagnosis> {
         let mut fonts = fontdb::Database::new();
         fonts.load_system_fonts();
         let default = fontdb::Query { families: &[fontdb::Family::Serif], ..fontdb::Query::default() };
@@ -59,8 +60,8 @@ impl Fonts {
             };
             let named = |face: &fontdb::FaceInfo| Some((!plain(face), face.families.first()?.0.clone()));
             let Some((_, family)) = fonts.faces().filter_map(named).min() else {
-                let problem = "it has text, but this computer has no fonts; convert the text to paths";
-                return Err(wrong(path, problem));
+                let problem = "it has text, but this computer has no fonts";
+                return Err(wrong(path, problem).hint("convert the text to paths"));
             };
             fonts.set_serif_family(family);
         }

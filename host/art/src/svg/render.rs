@@ -12,13 +12,14 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use image::{ImageError, ImageFormat};
+use observe::Diagnosis;
 use percent_encoding::percent_decode_str;
 use pictures::{Bounds, Opened};
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{self, ImageHrefResolver, ImageKind};
 
 use super::super::decode::whole_jpeg;
-use super::super::error::{LayersError, wrong};
+use super::super::error::wrong;
 use super::fonts::{DEFAULT, Fonts};
 use super::thin;
 
@@ -58,7 +59,7 @@ pub(super) struct Drawn {
 
 impl Renderer {
     /// `text` says whether the drawing needs fonts.
-    pub fn new(path: &Path, text: bool) -> Result<Renderer, LayersError> {
+    pub fn new(path: &Path, text: bool) -> Result<Renderer, Diagnosis> {
         let fonts = if text { Fonts::load(path)? } else { Fonts::none() };
         Ok(Renderer { path: path.to_path_buf(), fonts, known: Known::default() })
     }
@@ -74,7 +75,7 @@ impl Renderer {
     }
 
     /// Reads a drawing.
-    pub fn parsed(&self, text: &str, without: Without) -> Result<Drawn, LayersError> {
+    pub fn parsed(&self, text: &str, without: Without) -> Result<Drawn, Diagnosis> {
         let met = Arc::new(Mutex::new(Met::default()));
         let options = self.options(without, &met);
         let tree = usvg::Tree::from_str(text, &options).map_err(|error| self.unreadable(&error))?;
@@ -87,13 +88,13 @@ impl Renderer {
     }
 
     /// The size of a drawing, which may follow from all that is drawn in it.
-    pub fn size(&self, text: &str) -> Result<usvg::Size, LayersError> {
+    pub fn size(&self, text: &str) -> Result<usvg::Size, Diagnosis> {
         // Pictures that are missing matter only where they are printed.
         let tree = usvg::Tree::from_str(text, &self.options(Without::Nothing, &Arc::default()));
         tree.map(|tree| tree.size()).map_err(|error| self.unreadable(&error))
     }
 
-    fn unreadable(&self, error: &usvg::Error) -> LayersError {
+    fn unreadable(&self, error: &usvg::Error) -> Diagnosis {
         wrong(&self.path, format!("the drawing cannot be read: {error}"))
     }
 
@@ -103,7 +104,7 @@ impl Renderer {
         drawn: &Drawn,
         scale: Transform,
         (width, height): (u32, u32),
-    ) -> Result<Vec<u8>, LayersError> {
+    ) -> Result<Vec<u8>, Diagnosis> {
         let mut pixmap =
             Pixmap::new(width, height).ok_or_else(|| wrong(&self.path, "the drawing is too large"))?;
         let options = self.options(Without::Nothing, &Arc::default());

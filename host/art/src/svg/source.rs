@@ -12,7 +12,8 @@ use std::path::Path;
 
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
-use super::super::error::{LayersError, wrong};
+use super::super::error::wrong;
+use observe::Diagnosis;
 
 /// How far into a file its first element is looked for.
 const PROLOG: u64 = 1 << 20;
@@ -33,17 +34,18 @@ pub(in super::super) fn is_svg(file: &Path, start: &[u8]) -> bool {
 }
 
 /// The text of a drawing.
-pub(super) fn decoded(path: &Path, bytes: Vec<u8>) -> Result<String, LayersError> {
+pub(super) fn decoded(path: &Path, bytes: Vec<u8>) -> Result<String, Diagnosis> {
     let (encoding, mark) = match encoding(&bytes) {
         Ok(found) => found,
         Err(label) => {
-            let problem = format!("its encoding `{label}` is unknown; save the drawing as UTF-8");
-            return Err(wrong(path, problem));
+            let problem = format!("its encoding `{label}` is unknown");
+            return Err(wrong(path, problem).hint("save the drawing as UTF-8"));
         }
     };
     let bad = |_| {
         let name = encoding.name();
-        wrong(path, format!("it has bytes that are not {name}, its encoding; save the drawing as UTF-8"))
+        wrong(path, format!("it has bytes that are not {name}, its encoding"))
+            .hint("save the drawing as UTF-8")
     };
     if encoding == UTF_8 {
         let mut bytes = bytes;

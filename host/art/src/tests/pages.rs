@@ -78,7 +78,7 @@ fn several_pages_of_art_are_refused_until_one_is_chosen() {
     let bench = Bench::new();
     let file = bench.write("pages.ps", SEVERAL);
     let error = open(std::slice::from_ref(&file), &Options::default(), &Silent).unwrap_err();
-    assert!(matches!(&error, LayersError::Pages { pages, .. } if *pages == [1, 3, 4]), "{error}");
+    assert!(error.to_string().contains("art on 3 pages (1, 3, 4)"), "{error}");
     assert!(error.to_string().contains("has art on 3 pages (1, 3, 4)"), "{error}");
     let third = Options { pages: Pages::Number(3), ..Options::default() };
     let drawn = read(&[file], &third).drawn.dots();

@@ -1,8 +1,10 @@
-//! Which options help: libraries name what is wrong or what they suggest, only the command line knows its options.
+//! Which options help: libraries name what is wrong, what to do and the settings to do it with, only the command line knows its
+//! options.
 
-use art::{Accept, LayersError, Remedy, Setting, Settings};
+use art::{Accept, Remedy, Settings};
 use halftone::HalftoneError;
 use inks::InkSet;
+use observe::{Hint, with_hints};
 use press::chart::ChartError;
 use press::layout::{LayoutError, SizeError};
 use press::pipeline::JobError;
@@ -12,8 +14,25 @@ use protocol::ink::Ink;
 
 use crate::cli::arguments::choice::Choice;
 
+/// An error with its causes, and what to do about it in words and options of the command line.
+pub fn explained(error: &anyhow::Error) -> (String, Vec<String>) {
+    let (text, hints) = with_hints(error.as_ref());
+    (text, hints.into_iter().map(in_options).chain(of(error)).collect())
+}
+
+/// A hint with the options that change its settings.
+fn in_options(hint: &Hint) -> String {
+    let option = |(name, value): &(&str, String)| format!("--{name} {value}").trim_end().to_owned();
+    let options: Vec<String> = hint.settings.iter().map(option).collect();
+    match (&hint.words[..], &options[..]) {
+        (words, []) => words.to_owned(),
+        ("", [option]) => format!("the option is {option}"),
+        (words, options) => format!("{words}: {}", options.join(", ")),
+    }
+}
+
 /// Which options to try, if this error is one of those that options help against.
-pub fn of(error: &anyhow::Error) -> Option<String> {
+fn of(error: &anyhow::Error) -> Option<String> {
     error.chain().find_map(|cause| {
         let layout = cause.downcast_ref::<LayoutError>();
         let layout = layout.or_else(|| match cause.downcast_ref()? {
@@ -29,9 +48,6 @@ pub fn of(error: &anyhow::Error) -> Option<String> {
             StageError::Size(error) => Some(error),
             _ => None,
         });
-        if let Some(advice) = cause.downcast_ref().and_then(of_layers) {
-            return Some(advice);
-        }
         if let Some(StageError::Halftone(HalftoneError::NotProcess { .. })) = cause.downcast_ref() {
             return Some("--inks process leaves the others out".into());
         }
@@ -65,45 +81,6 @@ pub fn of(error: &anyhow::Error) -> Option<String> {
     })
 }
 
-/// What Ghostscript says of a file that it does not find.
-const NOT_FOUND: &str = "/undefinedfilename";
-
-/// The options that help against an error of layers.
-fn of_layers(error: &LayersError) -> Option<String> {
-    Some(match error {
-        LayersError::Setting { setting, .. } => format!("the option is {}", option_of(*setting)),
-        LayersError::Foil { ink, .. } => format!("add --inks +{}", ink.name()),
-        LayersError::NoSize { fits_mm, .. } | LayersError::Beyond { fits_mm, .. }
-            if below(*fits_mm) <= 0.0 =>
-        {
-            "nothing fits there: print fewer copies (--repeat) with a smaller --gap, or take a larger --paper"
-                .into()
-        }
-        LayersError::NoSize { fits_mm, .. } => {
-            format!("such as --dpi 1200, or --size {}mm for the largest that fits", below(*fits_mm))
-        }
-        LayersError::File { path, problem } if path.to_str().is_none() && problem.contains(NOT_FOUND) => {
-            "the name of the file is not UTF-8, so Ghostscript does not find it; rename the file".into()
-        }
-        LayersError::Beyond { fits_mm, says, .. } => format!(
-            "the options are --size ({}mm is the largest that fits), {}--paper and --crop",
-            below(*fits_mm),
-            if says.is_some() { "--dpi, " } else { "" }
-        ),
-        LayersError::Pages { pages, .. } => format!(
-            "--page {} reads one page; --pages white,gold,black reads one page per ink",
-            pages.first().unwrap_or(&1)
-        ),
-        LayersError::TooLarge { fits_mm, .. } => {
-            format!("--size {}mm is the largest that fits", below(*fits_mm))
-        }
-        LayersError::TooSmall { .. } => "the options are --size and --dpi".into(),
-        LayersError::White { .. } => "--white alpha prints white wherever the art is not transparent".into(),
-        LayersError::Passes { .. } => "the option is --passes".into(),
-        _ => return None,
-    })
-}
-
 /// The options that follow a suggestion, if `allowed` are the inks that may be used now.
 pub fn options_of(remedy: &Remedy, allowed: &InkSet) -> String {
     match remedy {
@@ -123,24 +100,10 @@ fn names(inks: impl Iterator<Item = Ink>) -> String {
     inks.map(Ink::name).collect::<Vec<_>>().join(",")
 }
 
-fn option_of(setting: Setting) -> &'static str {
-    match setting {
-        Setting::Inks => "--inks",
-        Setting::Order => "--order",
-        Setting::White => "--white",
-        Setting::Choke => "--choke",
-        Setting::Spread => "--spread",
-        Setting::Finish => "--finish",
-    }
-}
-
-/// A length in millimetres with one decimal, rounded down.
-fn below(mm: f64) -> f64 {
-    (10.0 * mm).floor() / 10.0
-}
-
 #[cfg(test)]
 mod tests {
+    use observe::{Diagnosis, Fault};
+
     use super::*;
 
     #[test]
@@ -160,34 +123,17 @@ mod tests {
         }
     }
 
-    fn said(error: LayersError) -> String {
-        of(&error.into()).expect("there is an option")
-    }
-
     #[test]
-    fn errors_name_the_option_that_avoids_them() {
-        let foil = LayersError::Foil { layer: "01-foil".into(), ink: Ink::GoldFoil };
-        let text = said(foil);
-        assert!(text.ends_with("add --inks +gold-foil"), "{text}");
-        let setting =
-            LayersError::Setting { setting: Setting::Finish, problem: "finish is not allowed".into() };
-        assert!(said(setting).ends_with("the option is --finish"));
-        let none = LayersError::Beyond {
-            path: "art.svg".into(),
-            says: None,
-            size_mm: (20.0, 10.0),
-            room_mm: (0.0, 269.7),
-            fits_mm: 0.0,
-        };
-        let text = said(none);
-        assert!(text.contains("--repeat") && !text.contains("--size"), "{text}");
-        let large = LayersError::TooLarge {
-            width_mm: 300.0,
-            height_mm: 200.0,
-            most_width_mm: 209.1,
-            most_height_mm: 328.5,
-            fits_mm: 203.29,
-        };
-        assert!(said(large).ends_with("--size 203.2mm is the largest that fits"));
+    fn hints_name_the_options_that_change_their_settings() {
+        let diagnosis = Diagnosis::of_setting("finish", "it is not allowed");
+        assert_eq!(explained(&diagnosis.into()).1, ["the option is --finish"]);
+        let diagnosis = Diagnosis::new(Fault::Setting, "the art is too large")
+            .hint("print it smaller or crop it")
+            .set("size", "203.2mm")
+            .set("crop", "")
+            .hint("it is a large picture");
+        let (text, hints) = explained(&anyhow::Error::new(diagnosis).context("not printed"));
+        assert_eq!(text, "not printed: the art is too large");
+        assert_eq!(hints, ["print it smaller or crop it: --size 203.2mm, --crop", "it is a large picture"]);
     }
 }

@@ -83,7 +83,6 @@ mod tests {
     use appearance::gamut::{GamutError, MixError};
     use appearance::solve::MixtureError;
     use appearance::weights::WeightError;
-    use art::LayersError;
     use device::flash::drive::DriveError;
     use device::flash::image::ImageError;
     use device::flash::picoboot::WriteError;
@@ -98,6 +97,8 @@ mod tests {
     use press::pipeline::JobError;
     use press::pipeline::document::StageError;
     use press::simulate::{CarouselError, SimulateError};
+
+    use observe::Diagnosis;
 
     use super::*;
     use crate::queue::filter::FilterError;
@@ -119,8 +120,8 @@ mod tests {
         GamutError::Mixture { what: "basis 2".into(), source: MixtureError::NoStacks }
     }
 
-    fn layers() -> LayersError {
-        LayersError::Io { path: path(), attempt: "open it", source: disk() }
+    fn art() -> Diagnosis {
+        Diagnosis::of_file(&path(), "cannot open it").because(disk())
     }
 
     fn journal() -> JournalError {
@@ -155,8 +156,7 @@ mod tests {
                 Box::new(MixFileError::Mix { path: path(), source: MixError::Rows { rows: 2, channels: 3 } }),
                 MixError::Rows { rows: 2, channels: 3 }.to_string(),
             ),
-            (Box::new(layers()), fire()),
-            (Box::new(LayersError::Gamut(mixture())), MixtureError::NoStacks.to_string()),
+            (Box::new(art()), fire()),
             (Box::new(StageError::Gamut(mixture())), MixtureError::NoStacks.to_string()),
             (Box::new(JobError::Simulate(SimulateError::Carousel(carousel()))), carousel().to_string()),
             (Box::new(FileError::Io { path: path(), source: disk() }), fire()),
@@ -178,8 +178,8 @@ mod tests {
             (Box::new(RunError::Save(journal())), fire()),
             (Box::new(FilterError::Io { what: "read the document", source: disk() }), fire()),
             (Box::new(FilterError::NoGhostscript(disk())), fire()),
-            (Box::new(FilterError::Plates(layers())), fire()),
-            (Box::new(FilterError::Layers { page: 3, source: layers() }), fire()),
+            (Box::new(FilterError::Plates(art())), fire()),
+            (Box::new(FilterError::Layers { page: 3, source: art() }), fire()),
             (
                 Box::new(FilterError::Job {
                     page: 3,
