@@ -290,6 +290,13 @@ impl<'m> Engine<'m> {
         engine
     }
 
+    /// Its memory, for the engine after a reset of a simulated board.
+    #[cfg(any(test, feature = "simulation"))]
+    pub fn into_memory(self) -> Memory<'m> {
+        let (band, decoder) = self.streams.into_memory();
+        Memory { data: self.data.into_memory(), output: self.output.into_memory(), band, decoder }
+    }
+
     /// What must be kept so that [`Engine::resume`] can continue.
     pub fn checkpoint(&self) -> Checkpoint {
         let mut progress = self.progress();

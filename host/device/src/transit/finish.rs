@@ -5,7 +5,6 @@
 //! own monitor does, until it says twice that it neither prints nor holds data. Limits: a port that does not talk back
 //! tells nothing, and that is what is reported; the sheet itself nobody but the user can see.
 
-use std::thread::sleep;
 use std::time::Duration;
 
 use protocol::link::message::{Ask, Fault};
@@ -16,7 +15,7 @@ use crate::questions::query::{Query, QueryError, Reply};
 use crate::questions::status::Status;
 
 /// Between two questions: the vendor's monitor asks every four seconds.
-pub(crate) const EVERY: Duration = Duration::from_secs(4);
+const EVERY: Duration = Duration::from_secs(4);
 /// How long the bridge may take to answer for itself.
 const BRIDGE_PATIENCE: Duration = Duration::from_secs(5);
 /// How long it may take to put a question to the printer, and to get the answer.
@@ -50,11 +49,11 @@ fn unknown(why: &str) -> Sheet {
     Sheet::Unknown(why.into())
 }
 
-/// Waits, without limit, until the printer says that it is done, asking every `every`. `watch` is told what is the
+/// Waits, without limit, until the printer says that it is done, asking every few seconds. `watch` is told what is the
 /// matter with the printer, once for each change; nothing when all is well again.
 pub(crate) fn await_sheet(
     open: &mut dyn FnMut() -> Result<Box<dyn Transport>, OpenError>,
-    every: Duration,
+    pause: &mut dyn FnMut(Duration),
     watch: &mut dyn FnMut(&[String]),
 ) -> Result<Sheet, FinishError> {
     let mut link = open()?;
@@ -96,6 +95,6 @@ pub(crate) fn await_sheet(
         if unanswered == most {
             return Ok(unknown("the printer does not answer"));
         }
-        sleep(every);
+        pause(EVERY);
     }
 }
