@@ -2,8 +2,9 @@
 //!
 //! Problem: a job is done when the sheet is out, but what the bridge knows is that the last byte has crossed the port;
 //! the printer holds some of it and prints for a while. Method: ask for its status every few seconds, as the vendor's
-//! own monitor does, until it says twice that it neither prints nor holds data. Limits: a port that does not talk back
-//! tells nothing, and that is what is reported; the sheet itself nobody but the user can see.
+//! own monitor does. Its answer lags: an MD-5000 says idle right behind the last byte and then prints for half a minute. So
+//! the sheet is out when the printer was seen printing and has ended, or has been idle for 20 s.
+//! Limits: a port that does not talk back tells nothing, and that is what is reported; the sheet itself nobody but the user can see.
 
 use std::time::Duration;
 
@@ -16,6 +17,8 @@ use crate::questions::status::Status;
 
 /// Between two questions: the vendor's monitor asks every four seconds.
 const EVERY: Duration = Duration::from_secs(4);
+/// So many answers in a row that it is idle are enough where it was never seen printing: 20 s.
+const STILL_IDLE: u32 = 6;
 /// How long the bridge may take to answer for itself.
 const BRIDGE_PATIENCE: Duration = Duration::from_secs(5);
 /// How long it may take to put a question to the printer, and to get the answer.
@@ -59,9 +62,9 @@ pub(crate) fn await_sheet(
     let mut link = open()?;
     let mut query = Query::new(&mut *link, BRIDGE_PATIENCE)?;
     let mut troubles: Vec<String> = Vec::new();
-    let (mut idle, mut unanswered, mut most) = (0, 0, NEVER);
+    let (mut printed, mut idle, mut unanswered, mut most) = (false, 0, 0, NEVER);
     loop {
-        let (now, said) = match query.printer(Ask::Printer, PRINTER_PATIENCE)? {
+        let (busy, said) = match query.printer(Ask::Printer, PRINTER_PATIENCE)? {
             Reply::OneWay => return Ok(unknown("the printer's port is one-way")),
             Reply::NotNow => return Ok(unknown("the bridge already has another job")),
             Reply::Unsure | Reply::NotAsked => {
@@ -73,11 +76,14 @@ pub(crate) fn await_sheet(
             Reply::Stopped(Fault::BusyTooLong) | Reply::Silent => (None, Vec::new()),
             Reply::Stopped(fault) => (None, vec![super::words::fault(fault, None)]),
             Reply::Bytes(bytes) => match Status::read(&bytes) {
-                Ok(status) => (Some(status.printing || status.holds_data || status.stale), status.errors),
+                Ok(status) => {
+                    printed |= status.printing;
+                    (Some(status.printing || status.holds_data || status.stale), status.errors)
+                }
                 Err(_) => (None, Vec::new()),
             },
         };
-        match now {
+        match busy {
             Some(busy) => {
                 (unanswered, most) = (0, NO_MORE);
                 idle = if busy { 0 } else { idle + 1 };
@@ -89,7 +95,7 @@ pub(crate) fn await_sheet(
             watch(&said);
             troubles = said;
         }
-        if idle == 2 {
+        if idle >= if printed { 1 } else { STILL_IDLE } {
             return Ok(Sheet::Out);
         }
         if unanswered == most {
