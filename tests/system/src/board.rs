@@ -2,7 +2,7 @@
 
 use bridge::alone::Alone;
 use bridge::checkpoint::{CheckpointStore, MARKS, Memory as Slots, PAST_SLOT, SLOT};
-use bridge::engine::{Engine, Identity, Memory};
+use bridge::engine::{Checkpoint, Engine, Identity, Memory};
 use bridge::links::Links;
 use bridge::printer_class::Intake;
 use model::flash::ModelFlash;
@@ -87,16 +87,20 @@ pub fn memory(data: usize, output: usize) -> Memory<'static> {
 }
 
 impl Board {
-    /// The board starts; `known` says that its memory is what an earlier start has left there.
+    /// The board starts; `known` says that its memory is what an earlier start has left there, `from_outside` that it was not
+    /// reset by its own watchdog.
     pub fn start(
         memory: Memory<'static>,
         retained: Retained,
         flash: &ModelFlash,
         boot: u32,
         known: bool,
+        from_outside: bool,
     ) -> Board {
         let identity = Identity { boot, serial: SERIAL, firmware: "test" };
         let (checkpoints, checkpoint) = CheckpointStore::new(retained, known);
+        let checkpoint =
+            if from_outside { checkpoint.map(Checkpoint::reset_from_outside) } else { checkpoint };
         let mut engine = match checkpoint {
             Some(checkpoint) => Engine::resume(memory, identity, checkpoint),
             None => Engine::new(memory, identity),

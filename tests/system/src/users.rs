@@ -330,6 +330,8 @@ impl Desk<'_> {
     fn reset(&self, person: &Person<'_>) {
         let Ok(mut link) = person.open(&address(), None) else { return };
         let Ok(mut query) = Query::new(&mut *link, BRIDGE) else { return };
+        // Whoever resets a bridge that has restarted gives up the job that it would go on with.
+        person.world.look().harmed = true;
         let _ = deliver::reset(&mut query, self.printers);
     }
 }

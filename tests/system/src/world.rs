@@ -107,8 +107,8 @@ pub struct World {
     retained: Retained,
     flash: ModelFlash,
     starts: u32,
-    /// The board is down until then, and starts knowing its memory or not.
-    down: Option<(u64, bool)>,
+    /// The board is down until then, for this reason.
+    down: Option<(u64, Down)>,
     /// The cable's data lines are pulled until then.
     pulled_until: u64,
     /// Connections so far, and the one that is open, by user.
@@ -159,7 +159,7 @@ impl World {
             before: NOTHING,
             speed: [40, 200, 800, 2000][draw.below(4)],
         };
-        world.start(false);
+        world.start(None);
         world
     }
 
@@ -194,12 +194,14 @@ impl World {
         }
     }
 
-    fn start(&mut self, known: bool) {
+    fn start(&mut self, after: Option<Down>) {
         let Some(memory) = self.memory.take() else { return };
         self.starts += 1;
         let boot = (Draw::new(self.seed ^ u64::from(self.starts)).number() as u32).max(1);
         self.flash.power_up();
-        let board = Board::start(memory, self.retained.clone(), &self.flash, boot, known);
+        let known = matches!(after, Some(Down::Watchdog | Down::Run));
+        let from_outside = after != Some(Down::Watchdog);
+        let board = Board::start(memory, self.retained.clone(), &self.flash, boot, known, from_outside);
         self.before = board.engine.progress();
         self.board = Some(board);
     }
@@ -213,7 +215,7 @@ impl World {
             self.retained = Retained::new((draw.number() % 256) as u8);
         }
         let away = 300 + draw.below(2_000) as u64;
-        self.down = Some((self.now + away * MS, how != Down::Cut));
+        self.down = Some((self.now + away * MS, how));
         self.unplug();
         self.plain = None;
     }
@@ -221,6 +223,7 @@ impl World {
     /// Every connection ends.
     fn unplug(&mut self) {
         self.to_board.clear();
+        self.plain = None;
         for user in 0..USERS {
             self.connections[user] += 1;
             self.to_host[user].clear();
@@ -241,11 +244,11 @@ impl World {
             || self.plain.is_some()
             || self.board.as_ref().is_some_and(|board| !board.engine.is_idle());
         self.now += if busy { 2 * MS } else { most.clamp(2 * MS, 25 * MS) };
-        if let Some((until, known)) = self.down
+        if let Some((until, how)) = self.down
             && self.now >= until
         {
             self.down = None;
-            self.start(known);
+            self.start(Some(how));
         }
         let (down, mut draw) = self.accidents();
         let mut todo = Todo::Nothing;
@@ -282,7 +285,11 @@ impl World {
         }
         if let Some(mut draw) = self.chance.happens(Kind::Age) {
             self.harmed = true;
-            let (byte, bit) = (draw.below(SECTORS * 4096), draw.below(8) as u8);
+            let (mut byte, bit) = (draw.below(SECTORS * 4096), draw.below(8) as u8);
+            if draw.one_in_1000(500) {
+                // In the first page of a job, if this is the first of its sectors.
+                byte = byte / 4096 * 4096 + 2 * 256 + byte % 256;
+            }
             self.flash.flip(byte, bit);
         }
         if self.chance.happens(Kind::Forge).is_some() {
@@ -353,6 +360,8 @@ impl World {
                     board.intake.buffer()[..count].copy_from_slice(&bytes[..count]);
                     *at += count;
                     if count == 0 {
+                        // All of it has gone; whether the job is over is the intake's to find out.
+                        self.plain = None;
                         break;
                     }
                     board.intake.receive(count, &mut board.engine, self.now);
