@@ -26,10 +26,11 @@ static JOBS: LazyLock<Vec<Prepared>> = LazyLock::new(|| {
 });
 
 static PACKED: LazyLock<Vec<Packed<'static>>> = LazyLock::new(|| {
-    let pack = |job: &'static Prepared| {
-        Packed::new(Job { name: "sheet", bytes: &job.bytes, checked: &job.checked }, &Silent)
+    let pack = |(which, job): (usize, &'static Prepared)| {
+        let job = Job { name: "sheet", bytes: &job.bytes, checked: &job.checked };
+        if which % 3 == 0 { Packed::raw(job) } else { Packed::new(job, &Silent) }
     };
-    JOBS.iter().map(pack).collect()
+    JOBS.iter().enumerate().map(pack).collect()
 });
 
 /// The job of this number, modulo [`SIZE`].

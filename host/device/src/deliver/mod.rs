@@ -302,8 +302,13 @@ impl<'a> Packed<'a> {
         let (content, bytes) = (job.content, job.content.bytes());
         match streams::of(content, observer).filter(|streams| streams.len() < bytes.len()) {
             Some(streams) => Packed { job, kind: JobKind::Streams, data: streams.into() },
-            None => Packed { job, kind: JobKind::Raw, data: bytes.into() },
+            None => Packed::raw(job),
         }
+    }
+
+    /// The job byte for byte.
+    pub fn raw(job: Job<'a>) -> Packed<'a> {
+        Packed { job, kind: JobKind::Raw, data: job.content.bytes().into() }
     }
 
     /// What people call it.
