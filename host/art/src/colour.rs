@@ -20,18 +20,21 @@ use super::averages::{averaged, joined};
 use super::bitplane;
 use super::compose::Settings;
 use super::error::{not_halftoned, unfitted};
+use super::fine;
 use super::flat::{BLACK, Flat, INKED, TONE, is_tone, split};
 use super::intent::Intent;
 use super::lattice::{Lattice, Nodes, ends, step, with_tints};
 use super::looks::Looks;
 use super::outline;
+use super::pixels::Pixels;
 use super::solids::Solids;
 use super::treatments::treatments;
 use appearance::brdf::Space;
 use appearance::document::SAMPLES;
 use appearance::gamut::{self, InkMix, Printable};
 use appearance::weights::{ONE, WeightMaps};
-use halftone::halftone;
+use halftone::green_noise::Table;
+use halftone::{Method, halftone};
 use observe::{Diagnosis, Observer};
 use sheet::{Plane, pack};
 
@@ -53,6 +56,8 @@ pub struct Colour {
     pub(super) flat: Flat,
     /// The black dots, if all others are white; then there is nothing else.
     pub(super) black: Option<Plane>,
+    /// The colours as they are read; then there is nothing else.
+    pub(super) pixels: Option<Pixels>,
 }
 
 impl Colour {
@@ -84,9 +89,25 @@ impl Colour {
         Some(Colour { flat: flat.at_dots(size, dots), ..colour })
     }
 
-    /// Whether there are no tones: every dot is in a flat colour.
-    pub(super) fn is_line_art(&self) -> bool {
-        self.black.is_some() || !self.flat.index.is_empty() && !self.flat.has_tones()
+    /// The colours of pixels of `N` bytes ([`Colour::of`]), kept as they are; `None` if all are white.
+    pub(super) fn of_pixels<const N: usize>(bytes: Vec<u8>, size: (u32, u32)) -> Option<Colour> {
+        let is_white = |pixels: &[[u8; N]]| {
+            pixels.iter().fold(255, |all, pixel| all & split(pixel).1.iter().fold(255, |a, v| a & v)) == 255
+        };
+        let white = bytes.as_chunks::<N>().0.par_chunks(1 << 12).all(is_white);
+        let pixels = Pixels { bytes, each: N, width: size.0 as usize, height: size.1 as usize };
+        (!white).then(|| Colour { pixels: Some(pixels), ..Colour::default() })
+    }
+
+    /// The colours of these pixels as tones and flat colours.
+    fn read(&self, dots: (usize, usize)) -> Cow<'_, Colour> {
+        let Some(Pixels { bytes, each, width, height }) = &self.pixels else { return Cow::Borrowed(self) };
+        let size = (*width as u32, *height as u32);
+        let read = match each {
+            4 => Colour::of::<4>(bytes.as_chunks().0, size, dots),
+            _ => Colour::of::<3>(bytes.as_chunks().0, size, dots),
+        };
+        Cow::Owned(Colour { overprints: self.overprints, ..read.unwrap_or_default() })
     }
 
     /// Flat colours alone; `None` if all are white.
@@ -139,7 +160,10 @@ impl Colour {
             let inks = black_inks(inks, library);
             return Ok(inks.into_iter().map(|ink| (ink, black.clone())).collect());
         }
-        let (stacks, index) = self.halftone(dots, inks, settings, library, observer)?;
+        let (stacks, index) = match settings.halftone {
+            Method::Fine => self.fine(dots, inks, settings, library, observer)?,
+            _ => self.read(dots).halftone(dots, inks, settings, library, observer)?,
+        };
         let mut inks_of = [0u16; 256];
         for (inks_of, stack) in inks_of.iter_mut().zip(&stacks) {
             let has = inks.iter().enumerate().filter(|(_, ink)| stack.layers().contains(ink));
@@ -147,6 +171,35 @@ impl Colour {
         }
         let planes = pack::pack(dots.0, &index, &inks_of, inks.len());
         Ok(inks.iter().zip(planes).collect())
+    }
+
+    /// Picks the stack of each dot by a table: stacks of process inks, and the stack of each dot.
+    fn fine(
+        &self,
+        dots: (usize, usize),
+        inks: &InkSet,
+        settings: &Settings,
+        library: &Library,
+        observer: &dyn Observer,
+    ) -> Result<(Vec<Stack>, Vec<u8>), LayersError> {
+        let space = Space::half_angle(SAMPLES);
+        let printable = Printable::from_library(library, inks, &space);
+        let solids = Solids::new(&printable, &space);
+        let fit = self.fit((&printable, &solids), space, settings, observer)?;
+        let minimum = fit.stacks.iter().map(|stack| library.minimum_cluster(stack)).max();
+        let table = Table::for_cluster(minimum.unwrap_or_default());
+        let index = match &self.pixels {
+            Some(pixels) => fine::dots(pixels.rows(dots), dots, &fit, &solids, table),
+            None => {
+                let keys = self.flat.keys();
+                let row = |y: usize, out: &mut [fine::Key]| {
+                    let dots = &self.flat.index[y * dots.0..(y + 1) * dots.0];
+                    out.iter_mut().zip(dots).for_each(|(out, &dot)| *out = keys[usize::from(dot)]);
+                };
+                fine::dots(row, dots, &fit, &solids, table)
+            }
+        };
+        Ok((fit.stacks, index))
     }
 
     /// Halftones the colours: stacks of process inks, and the stack of each dot.
@@ -194,7 +247,8 @@ impl Colour {
         settings: &Settings,
         observer: &dyn Observer,
     ) -> Result<Fit, Diagnosis> {
-        let has_drawings = self.flat.colours.len() > 2 || !self.drawn.is_empty();
+        let has_drawings =
+            self.pixels.is_some() || self.flat.colours.len() > 2 || !self.drawn.is_empty();
         let intents: &[Intent] = match settings.intent {
             Intent::Auto if has_drawings => &[Intent::Perceptual, Intent::Colorimetric],
             Intent::Auto => &[Intent::Perceptual],
@@ -285,9 +339,9 @@ pub(super) struct Fit {
     channels: usize,
     nodes: Nodes,
     /// Places of the 256 values between nodes.
-    steps: [(usize, u32); 256],
+    pub steps: [(usize, u32); 256],
     /// Number of the lattice for text and drawings.
-    of_drawings: usize,
+    pub of_drawings: usize,
 }
 
 impl Fit {
@@ -299,6 +353,17 @@ impl Fit {
             self.matrix.iter_mut().for_each(|shares| shares.push(0));
             self.stacks.len() - 1
         }) as u8
+    }
+
+    /// The share of every stack at each node.
+    pub fn shares(&self) -> impl Iterator<Item = Vec<u64>> {
+        self.nodes.weights().map(|weights| {
+            let share = |stack: usize| {
+                let parts = weights.iter().zip(&self.matrix);
+                parts.map(|(&weight, shares)| u64::from(weight) * u64::from(shares[stack])).sum()
+            };
+            (0..self.stacks.len()).map(share).collect()
+        })
     }
 
     /// The weights of the stacks in a flat colour.

@@ -94,6 +94,11 @@ impl Nodes {
         out.copy_from_slice(&sums.as_flattened()[..out.len()]);
     }
 
+    /// The weights of every node, padded with zeros.
+    pub fn weights(&self) -> impl Iterator<Item = &[u16]> {
+        self.lanes.chunks_exact(self.each).map(|lanes| lanes.as_flattened())
+    }
+
     fn of(&self, node: usize) -> &[[u16; 8]] {
         &self.lanes[node * self.each..][..self.each]
     }
@@ -121,11 +126,19 @@ impl Tint {
         if most == 0.0 || (most == least && order[0].0 < NODES - 1) {
             return None;
         }
-        let towards = if most > least { (middle - least) / (most - least) } else { 1.0 };
+        let towards = |[most, middle, least]: [f64; 3]| {
+            if most > least { (middle - least) / (most - least) } else { 1.0 }
+        };
+        let along = towards([most, middle, least]);
         let (dark, pale) = ((NODES - 1) as f64 - most, least);
-        let off_line = towards.min(1.0 - towards) / NEAR_IN_HUE;
+        let off_line = along.min(1.0 - along) / NEAR_IN_HUE;
         let part = (1.0 - dark / NEAR).max(0.0) * (1.0 - off_line.min(pale / NEAR)).max(0.0);
-        let (paper, second) = ((least / most).powf(1.0 / gamma), towards.powf(1.0 / gamma));
+        // Dots add light.
+        let light = [most, middle, least].map(|level| {
+            let value = (level / (NODES - 1) as f64).powf(1.0 / gamma);
+            f64::from(appearance::srgb::decode(value as f32))
+        });
+        let (paper, second) = (light[2] / light[0], towards(light));
         let (primary, secondary) = (order[0].1, order[0].1 | order[1].1);
         let ink = 1.0 - paper;
         Some(Tint { parts: [(7, paper), (secondary, ink * second), (primary, ink * (1.0 - second))], part })
@@ -133,9 +146,9 @@ impl Tint {
 }
 
 /// Prints the edges of a lattice on which no fit is wanted: from white to each of the six primaries and from cyan, magenta and
-/// yellow to the red, green and blue beside them. Along them are the two stacks that the ends name, in shares that change
-/// evenly: 30 % cyan is cyan on 30 % of the dots, M 100 Y 50 is magenta, with yellow on half of its dots. Nodes near them are such tints in
-/// part, so that a shading that ends there has no step.
+/// yellow to the red, green and blue beside them. Along them are the two stacks that the ends name, in the shares that have the light of
+/// the colour: a pink with a fifth of green's and blue's light is paper on a fifth of its dots and red on the others. Nodes near
+/// them are such tints in part, so that a shading that ends there has no step.
 pub(super) fn with_tints(
     mix: InkMix,
     lattice: usize,
