@@ -11,6 +11,7 @@
 //! in such an average: they are fixed. Limits: the accuracy of colours is that of the ink library.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use inks::{InkSet, Library, Stack};
 use protocol::ink::Ink;
@@ -100,7 +101,7 @@ impl Colour {
     }
 
     /// The colours of these pixels as tones and flat colours.
-    fn read(&self, dots: (usize, usize)) -> Cow<'_, Colour> {
+    pub(super) fn read(&self, dots: (usize, usize)) -> Cow<'_, Colour> {
         let Some(Pixels { bytes, each, width, height }) = &self.pixels else { return Cow::Borrowed(self) };
         let size = (*width as u32, *height as u32);
         let read = match each {
@@ -192,11 +193,11 @@ impl Colour {
             Some(pixels) => fine::dots(pixels.rows(dots), dots, &fit, &solids, table),
             None => {
                 let keys = self.flat.keys();
-                let row = |y: usize, out: &mut [fine::Key]| {
-                    let dots = &self.flat.index[y * dots.0..(y + 1) * dots.0];
+                let rows = |rows: Range<usize>, out: &mut [fine::Key]| {
+                    let dots = &self.flat.index[rows.start * dots.0..rows.end * dots.0];
                     out.iter_mut().zip(dots).for_each(|(out, &dot)| *out = keys[usize::from(dot)]);
                 };
-                fine::dots(row, dots, &fit, &solids, table)
+                fine::dots(rows, dots, &fit, &solids, table)
             }
         };
         Ok((fit.stacks, index))
@@ -247,8 +248,7 @@ impl Colour {
         settings: &Settings,
         observer: &dyn Observer,
     ) -> Result<Fit, Diagnosis> {
-        let has_drawings =
-            self.pixels.is_some() || self.flat.colours.len() > 2 || !self.drawn.is_empty();
+        let has_drawings = self.pixels.is_some() || self.flat.colours.len() > 2 || !self.drawn.is_empty();
         let intents: &[Intent] = match settings.intent {
             Intent::Auto if has_drawings => &[Intent::Perceptual, Intent::Colorimetric],
             Intent::Auto => &[Intent::Perceptual],
@@ -544,14 +544,14 @@ mod tests {
 
     #[test]
     fn a_tint_of_an_ink_is_that_ink_alone() {
-        // As CMYK arrives: 30 % cyan, 80 % magenta, 50 % yellow, 40 % of magenta and yellow, and 50 % yellow on magenta.
+        // The value between black and paper decides: of its light is the ground, and the rest is the ink.
         let tints = [
-            ([179, 255, 255], "C", "substrate", 0.3),
-            ([255, 51, 255], "M", "substrate", 0.8),
-            ([255, 255, 127], "Y", "substrate", 0.5),
-            ([255, 153, 153], "M+Y", "substrate", 0.4),
-            ([255, 0, 127], "M+Y", "M", 0.5),
-            ([0, 204, 255], "C+M", "C", 0.2),
+            ([179, 255, 255], "C", "substrate", 179),
+            ([255, 51, 255], "M", "substrate", 51),
+            ([255, 255, 127], "Y", "substrate", 127),
+            ([255, 153, 153], "M+Y", "substrate", 153),
+            ([255, 0, 127], "M+Y", "M", 127),
+            ([0, 204, 255], "C+M", "C", 204),
         ];
         let pixels: Vec<[u8; 4]> =
             tints.iter().flat_map(|&([r, g, b], ..)| [[ObjectType::DRAWING, r, g, b]; 4]).collect();
@@ -560,7 +560,8 @@ mod tests {
         let printable = Printable::from_library(&Library::builtin(), &process(), &space);
         let solids = Solids::new(&printable, &space);
         let fit = colour.fit((&printable, &solids), space, &Settings::default(), &Silent).unwrap();
-        for (rgb, name, ground, share) in tints {
+        for (rgb, name, ground, value) in tints {
+            let share = 1.0 - f64::from(appearance::srgb::decode(value as f32 / 255.0));
             let weights = fit.weights(rgb);
             let of = |name: &str| weights[fit.stacks.iter().position(|s| s.to_string() == name).unwrap()];
             assert!((of(name) - share).abs() < 0.005, "{name}: {} of {share}", of(name));

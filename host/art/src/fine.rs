@@ -11,16 +11,22 @@
 //! Source: `green_noise` of the halftone for the table; three examinations by a model of the eye for the rest (docs/decisions/flat-art.md).
 
 mod edges;
+#[cfg(test)]
+mod figures;
 mod lean;
-pub(super) mod mixtures;
+mod mixtures;
+#[cfg(test)]
+mod tests;
+
+use std::ops::Range;
 
 use rayon::prelude::*;
 
 use super::colour::Fit;
 use super::solids::Solids;
 use appearance::wide::wide;
-use halftone::green_noise::{SIDE, Table};
 pub(super) use edges::Edges;
+use halftone::green_noise::{SIDE, Table};
 use lean::Leans;
 use mixtures::{Mixtures, Stops};
 
@@ -53,9 +59,9 @@ pub(super) fn colour(key: Key) -> [u8; 3] {
     [r, g, b]
 }
 
-/// The number of the stack of every dot. `row` writes the colours of a row of dots.
+/// The number of the stack of every dot. `rows` writes the colours of rows of dots.
 pub(super) fn dots(
-    row: impl Fn(usize, &mut [Key]) + Sync,
+    rows: impl Fn(Range<usize>, &mut [Key]) + Sync,
     (width, height): (usize, usize),
     fit: &Fit,
     solids: &Solids<'_>,
@@ -63,21 +69,22 @@ pub(super) fn dots(
 ) -> Vec<u8> {
     // Sixteen are the stacks of four inks in one order.
     match fit.stacks.len() {
-        ..=16 => strips::<16>(&row, (width, height), &Mixtures::new(fit, solids), table),
-        _ => strips::<256>(&row, (width, height), &Mixtures::new(fit, solids), table),
+        ..=16 => strips::<16>(&rows, (width, height), STRIP, &Mixtures::new(fit, solids), table),
+        _ => strips::<256>(&rows, (width, height), STRIP, &Mixtures::new(fit, solids), table),
     }
 }
 
 fn strips<const N: usize>(
-    row: &(impl Fn(usize, &mut [Key]) + Sync),
+    rows: &(impl Fn(Range<usize>, &mut [Key]) + Sync),
     (width, height): (usize, usize),
+    strip: usize,
     mixtures: &Mixtures<N>,
     table: &Table,
 ) -> Vec<u8> {
     let mut index = vec![0; width * height];
-    index.par_chunks_mut(width * STRIP).enumerate().for_each(|(number, out)| {
-        let top = number * STRIP;
-        let strip = Strip::new(row, (width, height), top..top + out.len() / width);
+    index.par_chunks_mut(width * strip).enumerate().for_each(|(number, out)| {
+        let top = number * strip;
+        let strip = Strip::new(rows, (width, height), top..top + out.len() / width);
         wide(
             #[inline(always)]
             || strip.pick(mixtures, table, out),
@@ -90,7 +97,7 @@ fn strips<const N: usize>(
 struct Strip {
     width: usize,
     /// The strip's own rows among those read.
-    own: std::ops::Range<usize>,
+    own: Range<usize>,
     /// The strip's first row on the page.
     top: usize,
     /// The colours of the dots, row by row, with [`FLAT`].
@@ -99,14 +106,14 @@ struct Strip {
 
 impl Strip {
     fn new(
-        row: &impl Fn(usize, &mut [Key]),
+        read: &impl Fn(Range<usize>, &mut [Key]),
         (width, height): (usize, usize),
-        rows: std::ops::Range<usize>,
+        rows: Range<usize>,
     ) -> Strip {
-        let read = rows.start.saturating_sub(HALO)..(rows.end + HALO).min(height);
-        let own = rows.start - read.start..rows.end - read.start;
-        let mut plain = vec![0; width * read.len()];
-        plain.chunks_exact_mut(width).zip(read).for_each(|(out, y)| row(y, out));
+        let all = rows.start.saturating_sub(HALO)..(rows.end + HALO).min(height);
+        let own = rows.start - all.start..rows.end - all.start;
+        let mut plain = vec![0; width * all.len()];
+        read(all, &mut plain);
         let mut keys = plain.clone();
         let last = plain.len() / width - 1;
         for (y, out) in keys.chunks_exact_mut(width).enumerate() {

@@ -6,8 +6,8 @@
 //! that depends on the share, spaced as evenly as chance allows: `make` says how. The scale of the clusters follows from the minimum
 //! cluster of the inks, so the machine decides and not the art. The table for [`USUAL`] dots is stored, others are made when they
 //! are asked for.
-//! Cost: nothing for the stored one, half a second for another. Memory: 128 KiB.
-//! Limits: the minimum cluster is a mean: at a tenth of the area clusters are about half of it, at less they are smaller.
+//! Cost: nothing for the stored one, about a second for another. Memory: 128 KiB.
+//! Limits: the minimum cluster is the mean at three tenths of the area. At a twentieth, clusters are a fifth of it.
 //! Source: R. Ulichney, The void-and-cluster method for dither array generation (1993); D. Lau, G. Arce, N. Gallagher, Green-noise
 //! digital halftoning (1998), for clusters of a chosen size.
 
@@ -20,11 +20,11 @@ use appearance::weights::ONE;
 /// Dots after which a table repeats, across and down.
 pub const SIDE: usize = 256;
 
-/// The minimum cluster whose table is stored.
-pub const USUAL: u16 = 4;
+/// The minimum cluster whose table is stored: that of the process inks in the built-in library.
+pub const USUAL: u16 = 8;
 
 /// The ranks of the table for [`USUAL`], two bytes each, the low one first.
-static STORED: &[u8; 2 * SIDE * SIDE] = include_bytes!("green_noise/4.bin");
+static STORED: &[u8; 2 * SIDE * SIDE] = include_bytes!("green_noise/8.bin");
 
 /// Thresholds, row by row.
 pub struct Table(Vec<u16>);
@@ -35,10 +35,12 @@ impl Table {
         /// By minimum cluster.
         static TABLES: [OnceLock<Table>; super::LARGEST as usize + 1] = [const { OnceLock::new() }; _];
         let minimum = minimum.clamp(1, super::LARGEST);
-        TABLES[usize::from(minimum)].get_or_init(|| Table::of_ranks(match minimum {
-            USUAL => STORED.as_chunks::<2>().0.iter().map(|&rank| u16::from_le_bytes(rank)).collect(),
-            other => Table::ranks(other),
-        }))
+        TABLES[usize::from(minimum)].get_or_init(|| {
+            Table::of_ranks(match minimum {
+                USUAL => STORED.as_chunks::<2>().0.iter().map(|&rank| u16::from_le_bytes(rank)).collect(),
+                other => Table::ranks(other),
+            })
+        })
     }
 
     /// The order in which the dots of the table for this minimum cluster are set, made anew; it is stored for [`USUAL`].

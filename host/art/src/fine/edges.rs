@@ -11,6 +11,8 @@
 //! Cost: 5 ns a dot, some 300 ns at an edge; a byte a pixel. Limits: corners are rounded by half a pixel; what is fainter than
 //! [`TONE`] is a tone.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::{DRAWN, Key, colour, key};
@@ -39,9 +41,10 @@ pub struct Edges<F> {
 
 /// What lies between four pixels.
 enum Between {
+    Plain(Key),
     Tone([Key; 4]),
-    /// The two colours and how much each pixel has of the second.
-    Edge([Key; 2], [f32; 4]),
+    /// The two colours, and how much each pixel has of the second, in 1/255.
+    Edge([Key; 2], [u8; 4]),
 }
 
 impl<F: Fn(usize, usize) -> Key + Sync> Edges<F> {
@@ -54,34 +57,40 @@ impl<F: Fn(usize, usize) -> Key + Sync> Edges<F> {
         Edges { pixel, width, height, columns, rows, near, far }
     }
 
-    /// The colours of a row of dots.
-    pub fn row(&self, y: usize, out: &mut [Key]) {
-        let (top, down) = self.rows[y];
-        let bottom = (top + 1).min(self.height - 1);
-        let mut last = (usize::MAX, Between::Tone([0; 4]));
-        for (out, &(left, right)) in out.iter_mut().zip(&self.columns) {
-            if left != last.0 {
-                last = (left, self.between([left, (left + 1).min(self.width - 1)], [top, bottom]));
+    /// The colours of rows of dots.
+    pub fn read(&self, rows: Range<usize>, out: &mut [Key]) {
+        let mut known = (usize::MAX, Vec::new());
+        for (y, out) in rows.zip(out.chunks_exact_mut(self.columns.len())) {
+            let (top, down) = self.rows[y];
+            if top != known.0 {
+                known.0 = top;
+                known.1.clear();
+                known.1.extend((0..self.width).map(|left| self.between(left, top)));
             }
-            let parts = [(256 - right) * (256 - down), right * (256 - down), (256 - right) * down, right * down];
-            *out = match &last.1 {
-                Between::Tone([a, b, c, d]) if a == b && b == c && c == d => *a,
-                Between::Tone(keys) => tone(keys, parts),
-                Between::Edge([first, second], covered) => {
-                    let sum: f32 = covered.iter().zip(parts).map(|(&c, part)| c * part as f32).sum();
-                    if sum >= 32768.0 { *second } else { *first }
-                }
-            };
+            for (out, &(left, right)) in out.iter_mut().zip(&self.columns) {
+                let parts =
+                    [(256 - right) * (256 - down), right * (256 - down), (256 - right) * down, right * down];
+                *out = match &known.1[left] {
+                    Between::Plain(key) => *key,
+                    Between::Tone(keys) => tone(keys, parts),
+                    Between::Edge([first, second], covered) => {
+                        let sum: u32 = covered.iter().zip(parts).map(|(&c, part)| u32::from(c) * part).sum();
+                        if sum >= 128 << 16 { *second } else { *first }
+                    }
+                };
+            }
         }
     }
 
-    fn between(&self, [left, right]: [usize; 2], [top, bottom]: [usize; 2]) -> Between {
+    fn between(&self, left: usize, top: usize) -> Between {
+        let (right, bottom) = ((left + 1).min(self.width - 1), (top + 1).min(self.height - 1));
         let places = [(left, top), (right, top), (left, bottom), (right, bottom)];
         let keys = places.map(|(x, y)| (self.pixel)(x, y));
+        if keys.iter().all(|&key| key == keys[0]) {
+            return Between::Plain(keys[0]);
+        }
         let [a, b, c, d] = keys.map(colour);
-        let range = |v: usize| {
-            a[v].max(b[v]).max(c[v]).max(d[v]) - a[v].min(b[v]).min(c[v]).min(d[v])
-        };
+        let range = |v: usize| a[v].max(b[v]).max(c[v]).max(d[v]) - a[v].min(b[v]).min(c[v]).min(d[v]);
         if (0..3).all(|v| range(v) <= TONE) || !self.near[top * self.width + left] {
             return Between::Tone(keys);
         }
@@ -129,7 +138,9 @@ impl<F: Fn(usize, usize) -> Key + Sync> Edges<F> {
         let corner = |left: usize, top: usize| {
             left + 1 < self.width
                 && top + 1 < self.height
-                && [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().all(|(u, v)| self.at((left + u, top + v)) == own)
+                && [(0, 0), (1, 0), (0, 1), (1, 1)]
+                    .into_iter()
+                    .all(|(u, v)| self.at((left + u, top + v)) == own)
         };
         let (left, top) = (x.saturating_sub(1)..=x, y.saturating_sub(1)..=y);
         top.into_iter().any(|top| left.clone().any(|left| corner(left, top)))
@@ -202,7 +213,8 @@ impl Between {
         let (from, to) = (light(first), light(second));
         let parts = keys.map(|key| part(from, to, light(key)));
         let all = first != second && parts.iter().all(|&(_, off)| off <= OFF);
-        all.then(|| Between::Edge([first, second], parts.map(|(part, _)| part.clamp(0.0, 1.0))))
+        let covered = parts.map(|(part, _)| (255.0 * part.clamp(0.0, 1.0)).round() as u8);
+        all.then_some(Between::Edge([first, second], covered))
     }
 }
 
@@ -271,7 +283,8 @@ fn near_flat(
     });
     let mut near = vec![false; width * height];
     near.par_chunks_mut(width).enumerate().for_each(|(y, out)| {
-        for row in across.chunks_exact(width).take((y + far + 1).min(height)).skip(y.saturating_sub(far + 1)) {
+        for row in across.chunks_exact(width).take((y + far + 1).min(height)).skip(y.saturating_sub(far + 1))
+        {
             out.iter_mut().zip(row).for_each(|(out, &near)| *out |= near);
         }
     });

@@ -108,9 +108,11 @@ impl<'a> Leans<'a> {
             }
             let own = self.keys[first + x];
             let mut at_edge = false;
-            for (side, right, down) in SIDES.into_iter().filter(|(side, ..)| self.edges[first + x] & side > 0) {
+            for (side, right, down) in SIDES.into_iter().filter(|(side, ..)| self.edges[first + x] & side > 0)
+            {
                 let at = |times: isize| {
-                    let (x, y) = (x.checked_add_signed(times * right)?, row.checked_add_signed(times * down)?);
+                    let (x, y) =
+                        (x.checked_add_signed(times * right)?, row.checked_add_signed(times * down)?);
                     (x < self.width && y < self.busy.len()).then_some((x, y))
                 };
                 let ((Some(behind), Some(beyond)), true) = ((at(-1), at(1)), side > 0) else { continue };
@@ -138,7 +140,8 @@ impl<'a> Leans<'a> {
 pub(super) fn leaning<const N: usize>(own: &Stops<N>, other: &Stops<N>, at_edge: bool) -> Stops<N> {
     let (own_shares, others) = (shares(own), shares(other));
     let lacking: [bool; N] = std::array::from_fn(|q| others[q] == 0);
-    let sum: u32 = own_shares.iter().zip(lacking).filter(|(_, lacks)| *lacks).map(|(&s, _)| u32::from(s)).sum();
+    let sum: u32 =
+        own_shares.iter().zip(lacking).filter(|(_, lacks)| *lacks).map(|(&s, _)| u32::from(s)).sum();
     let all = u32::from(ONE);
     if sum == 0 || sum == all {
         return *own;

@@ -66,12 +66,34 @@ impl<const N: usize> Mixtures<N> {
             let stack = solids.named([4, 2, 1].map(|bit| if bits & bit > 0 { 255 } else { 0 }))?;
             numbers.iter().position(|&q| fit.stacks[q] == stack)
         });
-        Mixtures { nodes: nodes.collect(), steps: fit.steps, lattices: [0, fit.of_drawings], named, light, order }
+        Mixtures {
+            nodes: nodes.collect(),
+            steps: fit.steps,
+            lattices: [0, fit.of_drawings],
+            named,
+            light,
+            order,
+        }
+    }
+
+    /// The stops of a colour that names a stack.
+    fn named(&self, colour: [u8; 3]) -> Option<Stops<N>> {
+        if colour.iter().any(|&v| v != 0 && v != 255) {
+            return None;
+        }
+        let bits = colour.iter().fold(0, |bits, &v| 2 * bits + usize::from(v > 0));
+        self.named[bits].map(|named| std::array::from_fn(|q| if q < named { 0 } else { ONE }))
     }
 
     /// The stops of a colour of a picture, or of text or a drawing.
     #[inline]
     pub fn stops(&self, colour: [u8; 3], drawn: bool) -> Stops<N> {
+        self.named(colour).unwrap_or_else(|| self.between(colour, drawn))
+    }
+
+    /// The stops between the nodes of the lattice.
+    #[inline]
+    fn between(&self, colour: [u8; 3], drawn: bool) -> Stops<N> {
         let [x, y, z] = colour.map(|v| self.steps[usize::from(v)]);
         let mut axes = [(x.1, NODES * NODES), (y.1, NODES), (z.1, 1)];
         for (a, b) in [(0, 1), (1, 2), (0, 1)] {
@@ -100,12 +122,6 @@ impl<const N: usize> Mixtures<N> {
 
     /// The stops of a flat colour.
     pub fn flat(&self, colour: [u8; 3], drawn: bool) -> Stops<N> {
-        if colour.iter().all(|&v| v == 0 || v == 255) {
-            let bits = colour.iter().fold(0, |bits, &v| 2 * bits + usize::from(v > 0));
-            if let Some(named) = self.named[bits] {
-                return std::array::from_fn(|q| if q < named { 0 } else { ONE });
-            }
-        }
         let whole = shares(&self.stops(colour, drawn));
         if whole.iter().all(|&share| share == 0 || share >= LEAST) {
             return stops(&whole);

@@ -95,8 +95,10 @@ impl Field {
     fn look(&mut self, y: usize) {
         let row = y * self.side..(y + 1) * self.side;
         let dots = || self.energy[row.clone()].iter().zip(&self.set[row.clone()]);
-        self.least[y] = dots().map(|(&energy, &set)| if set { i32::MAX } else { energy }).fold(i32::MAX, i32::min);
-        self.most[y] = dots().map(|(&energy, &set)| if set { energy } else { i32::MIN }).fold(i32::MIN, i32::max);
+        self.least[y] =
+            dots().map(|(&energy, &set)| if set { i32::MAX } else { energy }).fold(i32::MAX, i32::min);
+        self.most[y] =
+            dots().map(|(&energy, &set)| if set { energy } else { i32::MIN }).fold(i32::MIN, i32::max);
     }
 
     /// The dot that is not set and has the least energy.
