@@ -33,6 +33,7 @@ use super::treatments::treatments;
 use appearance::brdf::Space;
 use appearance::document::SAMPLES;
 use appearance::gamut::{self, InkMix, Printable};
+use appearance::srgb;
 use appearance::weights::{ONE, WeightMaps};
 use halftone::green_noise::Table;
 use halftone::{Method, halftone};
@@ -182,7 +183,7 @@ impl Colour {
         settings: &Settings,
         library: &Library,
         observer: &dyn Observer,
-    ) -> Result<(Vec<Stack>, Vec<u8>), LayersError> {
+    ) -> Result<(Vec<Stack>, Vec<u8>), Diagnosis> {
         let space = Space::half_angle(SAMPLES);
         let printable = Printable::from_library(library, inks, &space);
         let solids = Solids::new(&printable, &space);
@@ -266,7 +267,12 @@ impl Colour {
         let of_drawings = intents.len() - 1;
         if of_drawings > 0 {
             let named = |colour| solids.named(colour);
-            mix = with_tints(mix, of_drawings, settings.gamma, named).map_err(unfitted)?;
+            let amount = |level: f64| {
+                let value = level.powf(1.0 / settings.gamma);
+                // Dots add light.
+                if settings.halftone == Method::Fine { srgb::decode(value as f32).into() } else { value }
+            };
+            mix = with_tints(mix, of_drawings, amount, named).map_err(unfitted)?;
         }
         let InkMix { stacks, maps, matrix } = mix;
         let channels = maps.channels();
@@ -544,7 +550,7 @@ mod tests {
 
     #[test]
     fn a_tint_of_an_ink_is_that_ink_alone() {
-        // The value between black and paper decides: of its light is the ground, and the rest is the ink.
+        // The value between black and paper decides: of it, or of its light, is the ground, and the rest is the ink.
         let tints = [
             ([179, 255, 255], "C", "substrate", 179),
             ([255, 51, 255], "M", "substrate", 51),
@@ -559,13 +565,18 @@ mod tests {
         let space = Space::half_angle(SAMPLES);
         let printable = Printable::from_library(&Library::builtin(), &process(), &space);
         let solids = Solids::new(&printable, &space);
-        let fit = colour.fit((&printable, &solids), space, &Settings::default(), &Silent).unwrap();
-        for (rgb, name, ground, value) in tints {
-            let share = 1.0 - f64::from(appearance::srgb::decode(value as f32 / 255.0));
-            let weights = fit.weights(rgb);
-            let of = |name: &str| weights[fit.stacks.iter().position(|s| s.to_string() == name).unwrap()];
-            assert!((of(name) - share).abs() < 0.005, "{name}: {} of {share}", of(name));
-            assert!((of(name) + of(ground) - 1.0).abs() < 0.002, "{name}: {weights:?}");
+        for halftone in [Method::Cells, Method::Fine] {
+            let settings = Settings { halftone, ..Settings::default() };
+            let fit = colour.fit((&printable, &solids), space.clone(), &settings, &Silent).unwrap();
+            for (rgb, name, ground, value) in tints {
+                let value = value as f32 / 255.0;
+                let share =
+                    1.0 - f64::from(if halftone == Method::Fine { srgb::decode(value) } else { value });
+                let weights = fit.weights(rgb);
+                let of = |name: &str| weights[fit.stacks.iter().position(|s| s.to_string() == name).unwrap()];
+                assert!((of(name) - share).abs() < 0.005, "{name}: {} of {share}", of(name));
+                assert!((of(name) + of(ground) - 1.0).abs() < 0.002, "{name}: {weights:?}");
+            }
         }
     }
 

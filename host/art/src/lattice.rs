@@ -119,7 +119,7 @@ struct Tint {
 
 impl Tint {
     /// The tint nearest to a node; `None` for greys.
-    fn of(node: [usize; 3], gamma: f64) -> Option<Tint> {
+    fn of(node: [usize; 3], amount: impl Fn(f64) -> f64) -> Option<Tint> {
         let mut order = [(node[0], 4), (node[1], 2), (node[2], 1)];
         order.sort_by_key(|&(level, _)| std::cmp::Reverse(level));
         let [most, middle, least] = order.map(|(level, _)| level as f64);
@@ -133,12 +133,8 @@ impl Tint {
         let (dark, pale) = ((NODES - 1) as f64 - most, least);
         let off_line = along.min(1.0 - along) / NEAR_IN_HUE;
         let part = (1.0 - dark / NEAR).max(0.0) * (1.0 - off_line.min(pale / NEAR)).max(0.0);
-        // Dots add light.
-        let light = [most, middle, least].map(|level| {
-            let value = (level / (NODES - 1) as f64).powf(1.0 / gamma);
-            f64::from(appearance::srgb::decode(value as f32))
-        });
-        let (paper, second) = (light[2] / light[0], towards(light));
+        let amount = [most, middle, least].map(|level| amount(level / (NODES - 1) as f64));
+        let (paper, second) = (amount[2] / amount[0], towards(amount));
         let (primary, secondary) = (order[0].1, order[0].1 | order[1].1);
         let ink = 1.0 - paper;
         Some(Tint { parts: [(7, paper), (secondary, ink * second), (primary, ink * (1.0 - second))], part })
@@ -146,13 +142,14 @@ impl Tint {
 }
 
 /// Prints the edges of a lattice on which no fit is wanted: from white to each of the six primaries and from cyan, magenta and
-/// yellow to the red, green and blue beside them. Along them are the two stacks that the ends name, in the shares that have the light of
-/// the colour: a pink with a fifth of green's and blue's light is paper on a fifth of its dots and red on the others. Nodes near
-/// them are such tints in part, so that a shading that ends there has no step.
+/// yellow to the red, green and blue beside them. Along them are the two stacks that the ends name, in shares that change evenly with
+/// the `amount` of the values of red, green and blue. If that is the value itself, 30 % cyan is cyan on 30 % of the dots; if it is light, a
+/// pink with a fifth of green's and blue's light is paper on a fifth of its dots. Nodes near them are such tints in part, so that a
+/// shading that ends there has no step.
 pub(super) fn with_tints(
     mix: InkMix,
     lattice: usize,
-    gamma: f64,
+    amount: impl Fn(f64) -> f64,
     named: impl Fn([u8; 3]) -> Option<Stack>,
 ) -> Result<InkMix, WeightError> {
     let InkMix { mut stacks, maps, mut matrix } = mix;
@@ -183,7 +180,7 @@ pub(super) fn with_tints(
     }
     for node in 0..ALL {
         let Some(Tint { parts, part }) =
-            Tint::of([node / (NODES * NODES), node / NODES % NODES, node % NODES], gamma)
+            Tint::of([node / (NODES * NODES), node / NODES % NODES, node % NODES], &amount)
         else {
             continue;
         };

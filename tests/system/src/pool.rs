@@ -1,7 +1,7 @@
 //! Jobs to send, made once: to check and to code one takes longer than to print it in this world.
 
 use device::deliver::{Job, Packed};
-use device::forms::{self, Checked};
+use device::forms::{self, Checked, Content};
 use model::{Planes, seeded};
 use observe::Silent;
 use std::sync::LazyLock;
@@ -27,7 +27,7 @@ static JOBS: LazyLock<Vec<Prepared>> = LazyLock::new(|| {
 
 static PACKED: LazyLock<Vec<Packed<'static>>> = LazyLock::new(|| {
     let pack = |(which, job): (usize, &'static Prepared)| {
-        let job = Job { name: "sheet", bytes: &job.bytes, checked: &job.checked };
+        let job = Job { name: "sheet", content: Content::Bytes(&job.bytes), checked: &job.checked };
         if which % 3 == 0 { Packed::raw(job) } else { Packed::new(job, &Silent) }
     };
     JOBS.iter().enumerate().map(pack).collect()

@@ -10,6 +10,7 @@ use crate::Colour;
 use appearance::brdf::Space;
 use appearance::document::SAMPLES;
 use appearance::gamut::Printable;
+use halftone::Method;
 use halftone::green_noise::USUAL;
 use inks::{InkSet, Library};
 use observe::Silent;
@@ -24,7 +25,14 @@ pub(super) static INKS: LazyLock<(Fit, Solids<'static>)> = LazyLock::new(|| {
         Box::leak(Box::new(Printable::from_library(&Library::builtin(), &process, &space)));
     let solids = Solids::new(printable, &space);
     let colours = Colour { pixels: Some(Pixels::default()), ..Colour::default() };
-    let fit = colours.fit((printable, &solids), space, &Settings::default(), &Silent).unwrap();
+    let fit = colours
+        .fit(
+            (printable, &solids),
+            space,
+            &Settings { halftone: Method::Fine, ..Settings::default() },
+            &Silent,
+        )
+        .unwrap();
     (fit, solids)
 });
 

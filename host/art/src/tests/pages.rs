@@ -176,7 +176,8 @@ fn spots_without_an_ink_print_by_their_process_colours_in_layers_and_queue_alike
     let art = read(std::slice::from_ref(&file), &Options::default());
     let [(Ink::White, white)] = amounts(&art)[..] else { panic!("{:?}", art.layers) };
     assert!((white / (800.0 * 250.0) - 1.0).abs() < 0.03, "{white}");
-    // In pixels of 300 dpi: the line, half of it on white, and white alone. Half of an ink is half of a value in sRGB.
+    // In pixels of 300 dpi: the line, half of it on white, and white alone. Half of an ink is half of a value in sRGB, which is printed on
+    // half of the dots.
     let colour = art.colour.as_ref().unwrap().read((art.width, art.length)).into_owned();
     let colour = colour.averages((art.width, art.length), None);
     for ((x, y), wanted) in
