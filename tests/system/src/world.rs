@@ -2,7 +2,7 @@
 //!
 //! Time is in µs. A step is a turn of every task of the board; it takes 2 ms while bytes flow, and up to 25 while nothing does.
 //! Processes of users run inside it: whoever waits for the link lets steps pass, and in one of them the other user may begin and end
-//! something ([`crate::users`]).
+//! something (`users`).
 
 use crate::board::{Board, Retained};
 use crate::chance::{Chance, Draw, Kind};
