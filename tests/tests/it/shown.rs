@@ -170,24 +170,24 @@ impl Desk {
             [Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black, Ink::MetallicSilver, Ink::Finish, Ink::White];
         let (bridge, address) =
             Bridge::on_tcp(([127, 0, 0, 1], 0).into(), Port::new(&inks, 1 << 20)).unwrap();
-        let desk = Desk { folder, bridge, address: format!("tcp:{address}") };
-        if !testing::is_full() {
-            for sample in SAMPLES {
-                let folder = desk.folder.path().join("samples").join(sample.name);
-                fs::create_dir_all(&folder).unwrap();
-                write_sample(&sample, &folder).unwrap();
-                shrink(&folder);
-            }
-        }
-        desk
+        Desk { folder, bridge, address: format!("tcp:{address}") }
     }
 
     /// The command with this desk's addresses for those of a real one, and this desk's documents.
     fn here(&self, command: &str) -> String {
         let mut command = command.strip_prefix("sudo ").unwrap_or(command).to_owned();
         if !testing::is_full() {
-            let samples = self.folder.path().join("samples");
-            command = command.replace("sample:", &format!("{}/", samples.display()));
+            for sample in SAMPLES {
+                let (name, small) =
+                    (format!("sample:{}", sample.name), self.folder.path().join("samples").join(sample.name));
+                if command.contains(&name) {
+                    if fs::create_dir_all(&small).is_ok() && !small.join("material.toml").exists() {
+                        write_sample(&sample, &small).unwrap();
+                        shrink(&small);
+                    }
+                    command = command.replace(&name, &small.display().to_string());
+                }
+            }
             for (option, of) in
                 [("--size", "foilpress"), ("--middle", "foilpress"), ("--pixels", "foilpress preview")]
             {

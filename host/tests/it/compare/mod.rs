@@ -8,41 +8,19 @@ pub mod scenery;
 mod truth;
 
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::path::Path;
 
 use camera::{BRIGHTER, FOCAL, Picture, RADIAL, RIGHT, SHOTS, Sheet, Shot, V, dot, minus, photograph};
-use scenery::{CAMERA, PRINT, photographed, three_materials};
+use scenery::{CAMERA, PRINT, photographed};
 use serde_json::Value;
 use testing::program::Bench;
 use truth::{Truth, rms, size};
 
-/// A folder with a document, its job, photographs of its print and the camera file; made once.
-fn folder() -> &'static Path {
-    static FOLDER: OnceLock<(Bench, PathBuf)> = OnceLock::new();
-    let (_, folder) = FOLDER.get_or_init(|| {
-        let bench = Bench::new();
-        photographed(&bench, &SHOTS);
-        let folder = bench.path("");
-        (bench, folder)
-    });
-    folder
-}
-
-/// A bench with copies of what the shared folder has.
+/// A bench with a document, its job, these photographs of its print and the camera file.
 fn bench(photos: &[&str]) -> Bench {
-    let (bench, from) = (Bench::new(), folder());
-    three_materials(&bench.path("tile"));
-    for name in ["job.rgl", "camera.toml"] {
-        fs::copy(from.join(name), bench.path(name)).unwrap();
-    }
-    for (name, size) in [("tile.dots", "60x40mm"), ("other.dots", "50x30mm")] {
-        bench.done(&format!("halftone {} -q --size {size} -o {name}", from.join("tile.mix").display()));
-    }
-    fs::create_dir(bench.path("photos")).unwrap();
-    for name in photos {
-        fs::copy(from.join("photos").join(name), bench.path("photos").join(name)).unwrap();
-    }
+    let bench = Bench::new();
+    let shots: Vec<Shot> = SHOTS.into_iter().filter(|shot| photos.contains(&shot.name)).collect();
+    photographed(&bench, &shots);
     bench
 }
 
@@ -65,7 +43,7 @@ fn poses_and_errors_are_the_true_ones() {
     let report: Value = serde_json::from_str(&said).expect("JSON");
     let alone = bench.done("compare photos --job job.rgl --camera camera.toml -q --json -o alone.html");
     let alone: Value = serde_json::from_str(&alone).expect("JSON");
-    let sheet = Sheet::load(&folder().join("tile.sheet"));
+    let sheet = Sheet::load(&bench.path("tile.sheet"));
     println!(
         "focal length {:.1} of {FOCAL}, distortion {} of {RADIAL:?}, brighter stack {}",
         number(&report["lens"]["focal_px"]),
@@ -141,7 +119,7 @@ fn what_is_as_predicted_does_not_differ() {
     let bench = bench(&[]);
     let shots = [&SHOTS[0], &SHOTS[3]];
     for (factor, darker) in [([1.0; 3], false), ([0.9; 3], true)] {
-        let sheet = Sheet::with_stack(&folder().join("tile.sheet"), factor);
+        let sheet = Sheet::with_stack(&bench.path("tile.sheet"), factor);
         for shot in shots {
             photograph(&sheet, shot, shot.exposure, true).save(bench.path("photos").join(shot.name)).unwrap();
         }
@@ -188,7 +166,7 @@ fn what_is_as_predicted_does_not_differ() {
 #[test]
 fn a_grey_card_is_white_where_the_paper_is_not() {
     let bench = bench(&[]);
-    let sheet = Sheet::with_card(&folder().join("tile.sheet"));
+    let sheet = Sheet::with_card(&bench.path("tile.sheet"));
     // The card is looked for where it is level.
     let level = Shot { eye: [-40.0, -60.0, 250.0], target: [0.0; 3], roll: 0.0, lamp: RIGHT, ..SHOTS[2] };
     let shots = [&SHOTS[0], &level];
@@ -216,8 +194,10 @@ fn a_grey_card_is_white_where_the_paper_is_not() {
         }
     }
     // Without a card in the pictures there is nothing to go by.
+    let plain = Sheet::load(&bench.path("tile.sheet"));
     for shot in shots {
-        fs::copy(folder().join("photos").join(shot.name), bench.path("photos").join(shot.name)).unwrap();
+        let photo = bench.path("photos").join(shot.name);
+        photograph(&plain, shot, shot.exposure, true).save(photo).unwrap();
     }
     fs::remove_file(bench.path("photos/compare.html")).unwrap();
     let said = bench.refused(1, &format!("compare photos {PRINT} --job job.rgl --camera card.toml"));
@@ -227,10 +207,10 @@ fn a_grey_card_is_white_where_the_paper_is_not() {
 
 #[test]
 fn photographs_and_camera_files_that_do_not_serve_are_named() {
-    let sheet = Sheet::load(&folder().join("tile.sheet"));
     let shot = &SHOTS[0];
     let compare = "compare photos --job job.rgl --camera camera.toml -q";
     let bench = bench(&[shot.name, SHOTS[1].name]);
+    let sheet = Sheet::load(&bench.path("tile.sheet"));
     let photo = bench.path("photos").join(shot.name);
     let original = image::open(&photo).unwrap().into_rgb16();
     let put = |change: &dyn Fn(&mut Picture)| {
@@ -260,6 +240,7 @@ fn photographs_and_camera_files_that_do_not_serve_are_named() {
 
     // The same photographs with another sheet's job, and with one without marks.
     bench.done("layout tile.dots -q --paper postcard -o bare.sheet");
+    bench.done("halftone tile.mix -q --size 50x30mm -o other.dots");
     bench.done("layout other.dots -q --paper postcard --camera-marks -o other.sheet");
     refused(
         "compare photos bare.sheet --camera camera.toml -q",
