@@ -147,6 +147,9 @@ mod tests {
     fn listed(help: &str) -> Vec<&str> {
         // Descriptions, which may begin a line with an option, stand further to the right.
         let options = help
+            .split("\nExample")
+            .next()
+            .unwrap_or(help)
             .lines()
             .map(|line| (line, line.trim_start()))
             .filter(|(line, text)| [2, 6].contains(&(line.len() - text.len())) && text.starts_with('-'));

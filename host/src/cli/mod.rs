@@ -33,8 +33,7 @@ use observe::visible_line;
         foilpress print sample:leaf\n  \
         foilpress layers white.png gold.png black.png --finish artwork\n  \
         foilpress send job.rgl --to serial:/dev/ttyACM0\n\n\
-        The steps of `print`, one command each:\n  \
-        factor, map, halftone, layout, separate, encode, simulate",
+        Steps of `print`: factor, map, halftone, layout, separate, encode, simulate",
     after_long_help = "Examples:\n  \
         foilpress print sample:leaf\n  \
         foilpress print my-material/ --size 120x90mm --bases 8 --to file:job.rgl\n  \

@@ -287,7 +287,7 @@ mod tests {
     fn a_text_from_anywhere_is_one_line() {
         let messages = Messages::of_filter(Vec::new());
         messages.info("two\nlines\u{1b}[31m\rSTATE: +paused");
-        assert_eq!(said(messages), ["INFO: two lines [31m STATE: +paused"]);
+        assert_eq!(said(messages), ["INFO: two lines\\u001b[31m\\u000dSTATE: +paused"]);
     }
 
     /// Two processes write to one pipe, so a line in parts would be torn apart.
