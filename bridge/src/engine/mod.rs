@@ -481,10 +481,13 @@ impl<'m> Engine<'m> {
         }
     }
 
-    /// Has the printer reset unless it is known to stand between two jobs.
+    /// Has the printer reset unless it is known to stand between two jobs. One with a fault waits for its end, since its supply may
+    /// be gone for too short a time to count yet.
     fn reset_unless_at_rest(&mut self) {
         self.owes_reset |= !self.at_rest;
-        self.reset_if_owed();
+        if self.fault.is_none() {
+            self.reset_if_owed();
+        }
     }
 
     /// Has the printer reset, if it must be and can be.
