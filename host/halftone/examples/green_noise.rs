@@ -3,6 +3,7 @@
 
 use std::io::Write;
 
+#[expect(clippy::disallowed_methods, reason = "the table is bytes, and goes into a file")]
 fn main() -> std::io::Result<()> {
     let minimum = std::env::args().nth(1).and_then(|text| text.parse().ok());
     let minimum = minimum.unwrap_or(halftone::green_noise::USUAL);

@@ -6,7 +6,7 @@
 //! for it, which never hurts. For each ink the most often any one stack still needs it is a lower bound, summed
 //! over inks; it is exact unless two stacks want two inks in opposite orders. Inks are tried in the
 //! customary order from the paper up, so of all shortest lists the first in that order is found.
-//! Cost: microseconds for the stacks that occur. Limits: after [`MOST_STATES`] states the search is given up for a
+//! Cost: microseconds for the stacks that occur. Limits: after `MOST_STATES` states the search is given up for a
 //! list that serves all stacks but may not be shortest, and says so.
 
 use std::collections::HashMap;

@@ -76,7 +76,7 @@ fn coded<'p>(
     let traces = (0..passes)
         .into_par_iter()
         .map(|number| {
-            let traces = Traces::of(&*plane(number)?, columns, places);
+            let traces = Traces::of(&plane(number)?, columns, places);
             observer.advance(share);
             Some(traces)
         })
