@@ -112,6 +112,11 @@ impl Colour {
         Cow::Owned(Colour { overprints: self.overprints, ..read.unwrap_or_default() })
     }
 
+    /// Whether no dot has a colour: all that was drawn is finer than a dot.
+    fn is_empty(&self) -> bool {
+        self.pixels.is_none() && self.black.is_none() && self.rgb.is_empty() && self.flat.index.is_empty()
+    }
+
     /// Flat colours alone; `None` if all are white.
     pub(super) fn of_flat(flat: Flat, dots: (usize, usize)) -> Option<Colour> {
         if flat.is_black_and_white() {
@@ -158,13 +163,18 @@ impl Colour {
         library: &Library,
         observer: &dyn Observer,
     ) -> Result<Vec<(Ink, Plane)>, Diagnosis> {
-        if let Some(black) = &self.black {
+        let is_fine = settings.halftone == Method::Fine;
+        let colour = if is_fine { Cow::Borrowed(self) } else { self.read(dots) };
+        if colour.is_empty() {
+            return Ok(Vec::new());
+        }
+        if let Some(black) = &colour.black {
             let inks = black_inks(inks, library);
             return Ok(inks.into_iter().map(|ink| (ink, black.clone())).collect());
         }
-        let (stacks, index) = match settings.halftone {
-            Method::Fine => self.fine(dots, inks, settings, library, observer)?,
-            _ => self.read(dots).halftone(dots, inks, settings, library, observer)?,
+        let (stacks, index) = match is_fine {
+            true => colour.fine(dots, inks, settings, library, observer)?,
+            false => colour.halftone(dots, inks, settings, library, observer)?,
         };
         let mut inks_of = [0u16; 256];
         for (inks_of, stack) in inks_of.iter_mut().zip(&stacks) {

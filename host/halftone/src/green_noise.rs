@@ -104,7 +104,7 @@ mod tests {
     #[test]
     fn the_stored_table_is_the_one_that_is_made() {
         let made: Vec<u8> = Table::ranks(USUAL).into_iter().flat_map(u16::to_le_bytes).collect();
-        assert!(made == STORED, "run the example green_noise, and see docs/code.md for what a table changes");
+        assert!(made == STORED, "the example green_noise makes the stored table");
     }
 
     /// At a tenth of the area and more, parts grow with the area, holes like dots, and few dots lie alone.
