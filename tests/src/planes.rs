@@ -2,12 +2,11 @@
 
 use appearance::gamut::InkMix;
 use appearance::weights::{ONE, WeightMaps, quantise};
-use halftone::{Method, Settings, halftone};
 use inks::Stack;
 use observe::Silent;
+use press::halftone::{Method, Settings, halftone};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
-use sheet::DotMap;
 use std::sync::OnceLock;
 
 /// Dots across an A4 page.
@@ -34,25 +33,13 @@ pub fn clustered(size: (usize, usize), scale: (f64, f64), paper: Paper) -> Vec<V
 }
 
 /// The same by another method.
-pub fn halftoned(method: Method, size: (usize, usize), scale: (f64, f64), paper: Paper) -> Vec<Vec<u8>> {
-    let map = dots(method, &Ink::ALL[..8], size, scale, paper);
-    (1..9u8)
-        .map(|ink| {
-            let dots = map.index().chunks_exact(8);
-            dots.map(|dots| dots.iter().fold(0, |byte, &stack| byte << 1 | u8::from(stack == ink))).collect()
-        })
-        .collect()
-}
-
-/// A stack of each of these inks and the bare paper over a whole page.
-pub fn dots(
+pub fn halftoned(
     method: Method,
-    inks: &[Ink],
     (width, height): (usize, usize),
     scale: (f64, f64),
     paper: Paper,
-) -> DotMap {
-    let count = inks.len() + 1;
+) -> Vec<Vec<u8>> {
+    let count = 9;
     let mut data = vec![0; width * height * count];
     for (pixel, out) in data.chunks_exact_mut(count).enumerate() {
         let (x, y) = ((pixel % width) as f64 / scale.0, (pixel / width) as f64 / scale.1);
@@ -61,11 +48,18 @@ pub fn dots(
             .collect();
         quantise(&weights, out);
     }
-    let stacks = std::iter::once(Stack::SUBSTRATE).chain(inks.iter().map(|&ink| Stack::new(vec![ink])));
+    let stacks =
+        std::iter::once(Stack::SUBSTRATE).chain(Ink::ALL[..8].iter().map(|&ink| Stack::new(vec![ink])));
     let matrix = (0..count).map(|i| (0..count).map(|j| if i == j { ONE } else { 0 }).collect()).collect();
     let maps = WeightMaps::new(width, height, count, data).expect("quantised");
     let mix = InkMix { stacks: stacks.collect(), maps, matrix };
     let page = (paper.width(), paper.length());
     let settings = Settings { method, ..Settings::uniform(count, 8) };
-    halftone(&mix, page, None, &settings, &Silent).expect("a page")
+    let map = halftone(&mix, page, None, &settings, &Silent).expect("a page");
+    (1..9u8)
+        .map(|ink| {
+            let dots = map.index().chunks_exact(8);
+            dots.map(|dots| dots.iter().fold(0, |byte, &stack| byte << 1 | u8::from(stack == ink))).collect()
+        })
+        .collect()
 }

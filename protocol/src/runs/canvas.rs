@@ -46,7 +46,7 @@ const PORTION: usize = 32;
 
 /// The result of [`Canvas::lay`].
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum TileProgress {
+pub(super) enum Laid {
     /// There was nothing to lay out.
     Blank,
     /// There is more: call it again, and ink nothing in between.
@@ -114,10 +114,10 @@ impl Canvas {
 
     /// Lays the tile out in rows of `stride` bytes, starting with its first row, and begins the next tile. A tile that takes
     /// long is laid out only in part. Its place must be blank.
-    pub(super) fn lay(&mut self, tile: &Tile, rows: &mut [u8], stride: usize) -> TileProgress {
+    pub(super) fn lay(&mut self, tile: &Tile, rows: &mut [u8], stride: usize) -> Laid {
         let (first, end) = self.used;
         if first >= end {
-            return TileProgress::Blank;
+            return Laid::Blank;
         }
         if (tile.w, tile.h) != (EDGE, EDGE) {
             return self.lay_dots(tile, rows, stride);
@@ -136,7 +136,7 @@ impl Canvas {
                 put(left, right, shift, &mut row[at..]);
             }
         }
-        TileProgress::Whole
+        Laid::Whole
     }
 
     fn lay_squares(
@@ -169,7 +169,7 @@ impl Canvas {
     }
 
     /// Makes the table if it is another tile's, or lays out a portion of the line.
-    fn lay_dots(&mut self, tile: &Tile, rows: &mut [u8], stride: usize) -> TileProgress {
+    fn lay_dots(&mut self, tile: &Tile, rows: &mut [u8], stride: usize) -> Laid {
         // The way back is the way along, turned by half a circle.
         let (orientation, turned) = match tile.orientation {
             Orientation::Back => (Orientation::Along, Some((tile.h - 1) * EDGE + tile.w - 1)),
@@ -180,7 +180,7 @@ impl Canvas {
         if table.shape != Some(shape) {
             shape.fill(&mut table.dots);
             table.shape = Some(shape);
-            return TileProgress::Part;
+            return Laid::Part;
         }
         let (first, end) = self.used;
         let until = end.min(first + PORTION);
@@ -201,10 +201,10 @@ impl Canvas {
         }
         if until < end {
             self.used = (until, end);
-            return TileProgress::Part;
+            return Laid::Part;
         }
         self.used = UNUSED;
-        TileProgress::Whole
+        Laid::Whole
     }
 }
 

@@ -2,7 +2,7 @@
 
 use inks::Stack;
 
-use super::result::mix::MixError;
+use super::mix::MixError;
 use crate::solve::MixtureError;
 use crate::weights::WeightError;
 

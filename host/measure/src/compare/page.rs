@@ -8,8 +8,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use press::html::{self, escape};
 
-use super::comparison::{Comparison, PhotoFigures, Pictures};
-use super::figures::Errors;
+use super::{Comparison, Errors, PhotoFigures, Pictures};
 
 /// Stacks listed for a photograph.
 const STACKS: usize = 12;

@@ -15,19 +15,17 @@ use image::codecs::jpeg::JpegEncoder;
 use inks::{Curve, Stack};
 use observe::Observer;
 use press::preview::{Radiance, Source, ToneCurve, picture as picture_of};
-use sheet::Area;
+use press::sheet::Area;
 use view::{Light, Lit, Renderer, Scene};
 
-use super::comparison::{PhotoFigures, Pictures};
 use super::figures::{self, Cover, Lighting, Scale, Spots, Steps};
-use super::flat::{ComparedArea, Flat};
-use super::inputs::{ComparedPrint, SheetPhoto, space};
+use super::flat::{Flat, Window};
 use super::picture::Picture;
-use super::setup::{Card, CompareSetup, White};
+use super::{Card, PhotoFigures, Pictures, Printed, Setup, Shot, White, space};
 use crate::MeasureError;
-use crate::curves::card;
-use crate::geometry::pose::{Lens, Pose, SolvedCamera};
-use crate::linalg::{median, spread};
+use crate::camera::{Camera, Lens, Pose};
+use crate::card;
+use crate::linear::{median, spread};
 
 /// Quality of the pictures: differences of a percent stay visible.
 const QUALITY: u8 = 88;
@@ -36,7 +34,7 @@ const DIFFERENCE: f64 = 0.3;
 
 /// What is compared, prepared once for all photographs.
 pub(super) struct Scenery {
-    window: ComparedArea,
+    window: Window,
     print: Shown,
     document: Option<(Shown, Shown)>,
     stacks: Vec<String>,
@@ -50,7 +48,7 @@ struct Shown {
 }
 
 impl Shown {
-    fn new(source: &Source<'_>, rows: &Table, window: &ComparedArea) -> Result<Shown, MeasureError> {
+    fn new(source: &Source<'_>, rows: &Table, window: &Window) -> Result<Shown, MeasureError> {
         let metres = window.size.map(|side| side / 1000.0);
         let longest = window.width.max(window.height).clamp(64, 2048);
         let lit = Lit::new(source, metres, longest).map_err(view_error)?;
@@ -66,14 +64,14 @@ fn view_error(error: impl std::fmt::Display) -> MeasureError {
 
 impl Scenery {
     pub(super) fn new(
-        printed: &ComparedPrint<'_>,
+        printed: &Printed<'_>,
         area: Area,
         middle: [f64; 2],
         size: [f64; 2],
-        shot: &SheetPhoto,
-        camera: &SolvedCamera,
+        shot: &Shot,
+        camera: &Camera,
     ) -> Result<Scenery, MeasureError> {
-        let ComparedPrint { sheet, library, document } = printed;
+        let Printed { sheet, library, document } = printed;
         let space = &space();
         // As fine as the photographs are.
         let pixels = camera.lens.density(&camera.poses[0], middle);
@@ -83,7 +81,7 @@ impl Scenery {
                 shot.name
             )));
         }
-        let window = ComparedArea::new(middle, size, pixels);
+        let window = Window::new(middle, size, pixels);
         let rows = reflectances(sheet.stacks(), library, space);
         let print = Shown::new(&Source::Print { dots: sheet, space, stacks: &rows, area }, &rows, &window)?;
         let factored =
@@ -101,10 +99,10 @@ impl Scenery {
     /// One photograph beside its prediction.
     pub(super) fn compared(
         &self,
-        shot: &SheetPhoto,
+        shot: &Shot,
         number: usize,
-        camera: &SolvedCamera,
-        setup: &CompareSetup,
+        camera: &Camera,
+        setup: &Setup,
         observer: &dyn Observer,
     ) -> Result<(PhotoFigures, Pictures), MeasureError> {
         let (pose, lens) = (&camera.poses[number], &camera.lens);
@@ -191,7 +189,7 @@ impl Scenery {
     /// from them. Marks that differ leave the factors uncertain.
     fn paper_scale(
         &self,
-        shot: &SheetPhoto,
+        shot: &Shot,
         picture: &Picture,
         lighting: &Lighting,
     ) -> Result<(Scale, f64), MeasureError> {
@@ -246,7 +244,7 @@ impl Scenery {
 
 /// The factors that make the middle step of a grey card in the sheet's plane as bright as it is.
 fn card_scale(
-    shot: &SheetPhoto,
+    shot: &Shot,
     picture: &Picture,
     stated: &Card,
     lighting: &Lighting,

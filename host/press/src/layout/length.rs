@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use sheet::DOTS_PER_MM;
+use crate::sheet::DOTS_PER_MM;
 
 /// A length in millimetres.
 #[derive(Clone, Copy, PartialEq, PartialOrd, Debug, Default)]

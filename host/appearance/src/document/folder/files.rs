@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::settings::{FolderSettings, SETTINGS};
+use super::settings::{SETTINGS, Settings};
 use crate::document::error::{DocumentError, list};
 use crate::document::names::{self, Role};
 use crate::document::source::Source;
@@ -20,7 +20,7 @@ pub(super) struct Files {
 impl Files {
     pub(super) fn find(
         folder: &Path,
-        settings: &FolderSettings,
+        settings: &Settings,
         source: &mut Source<'_>,
     ) -> Result<Files, DocumentError> {
         let io = |source| DocumentError::Io { path: folder.to_path_buf(), attempt: "list", source };

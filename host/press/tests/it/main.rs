@@ -1,3 +1,0 @@
-//! The stages from outside.
-
-mod damaged_stages;
