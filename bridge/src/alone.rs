@@ -6,7 +6,7 @@
 //! Method: a poll does one thing at most: it answers a question, writes a page, or reads one. Storing goes on only while
 //! nothing is printed, because the flash cannot be read while it is written, and the processor stands still for that long.
 //! Printing writes to the flash twice: before the first byte, and when the job has ended. So the printer's state after a loss of the
-//! supply is known from the flash, and after any other reset from memory, to the byte ([`crate::keeper`]); then the
+//! supply is known from the flash, and after any other reset from memory, to the byte ([`crate::checkpoint`]); then the
 //! engine gets the data once more and leaves out what has crossed.
 //! Cost: a poll that writes takes as long as the flash does; all others stay well below a millisecond.
 //! Limits: if the supply goes between the last byte of a job and the note that it has ended, some milliseconds, the sheet counts as lost.

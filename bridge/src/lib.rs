@@ -11,7 +11,7 @@
 //! | [`store`] | how jobs lie in the flash, whatever the supply does |
 //! | [`alone`] | what is stored and printed from the store, and what of it is remembered |
 //! | [`button`] | what a press of the button means |
-//! | [`keeper`] | how a reset of the board leaves where a job stands |
+//! | [`checkpoint`] | how a reset of the board leaves where a job stands |
 //! | [`links`] | which of two ways to the host is answered |
 //! | [`log`] | which piece of the log answers a question |
 //! | [`printer_class`] | the ordinary printer that operating systems see |
@@ -28,9 +28,9 @@ extern crate std;
 
 pub mod alone;
 pub mod button;
+pub mod checkpoint;
 pub mod driver;
 pub mod engine;
-pub mod keeper;
 pub mod lamp;
 pub mod links;
 pub mod log;

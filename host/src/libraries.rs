@@ -6,9 +6,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use files::durable;
+use files::scratch::{self, Scratch};
 use inks::archive::{self, Member};
 use inks::{FILE_NAME, Library};
-use press::scratch::{self, Scratch};
 
 use crate::folders;
 
@@ -104,7 +105,7 @@ pub fn install(name: &str, members: &[Member]) -> Result<(PathBuf, Library)> {
     })?;
     // Held until the folder has its name, so that an interruption finds either all of it or nothing.
     let folders = scratch::folders();
-    fs::rename(&inside, &target).with_context(cannot)?;
+    durable::place(&inside, &target).with_context(cannot)?;
     drop(folders);
     Ok((target, library))
 }

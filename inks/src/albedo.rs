@@ -49,7 +49,7 @@ impl Albedo {
     }
 
     /// The albedo of a curve, channel by channel.
-    pub fn of(&self, curve: &Curve) -> [f64; 3] {
+    pub fn of_curve(&self, curve: &Curve) -> [f64; 3] {
         self.sum(|t| curve.at(t))
     }
 

@@ -22,7 +22,8 @@ use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 use crate::format::{FILE_NAME, File, MOST_BYTES};
 use crate::library::Library;
 use crate::provenance::Provenance;
-use crate::read::{MOST_CURVE_BYTES, MOST_STACKS, is_licence};
+use crate::read::fields::MOST_CURVE_BYTES;
+use crate::read::{MOST_STACKS, is_licence};
 
 /// The file with the origin of the curves and the hashes of the files.
 pub const PROVENANCE: &str = "provenance.json";

@@ -33,7 +33,7 @@ pub struct Knots {
 
 /// An angle between the knots.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place(Between);
+pub struct KnotPosition(Between);
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Between {
@@ -62,10 +62,10 @@ impl Knots {
     }
 
     /// Finds an angle in radians among the knots.
-    pub fn place(&self, theta: f64) -> Place {
+    pub fn place(&self, theta: f64) -> KnotPosition {
         let t = &self.theta;
         let above = t.partition_point(|&t| t <= theta);
-        Place(match above {
+        KnotPosition(match above {
             0 if t.len() > 1 => {
                 let step = t[1] * t[1] - t[0] * t[0];
                 Between::Below(((t[0] * t[0] - theta * theta) / step).clamp(0.0, CONTINUED))
@@ -83,7 +83,7 @@ impl Knots {
 
     /// The value at a place; `sample` gives that of each knot, finite and 0 or more.
     #[inline]
-    pub fn value(&self, place: Place, sample: impl Fn(usize) -> f64) -> f64 {
+    pub fn value(&self, place: KnotPosition, sample: impl Fn(usize) -> f64) -> f64 {
         let (i, s) = match place.0 {
             Between::Below(part) => {
                 let (first, second) = (sample(0), sample(1));

@@ -17,7 +17,7 @@ mod judge;
 mod knots;
 pub mod lab;
 mod library;
-pub mod linear;
+pub mod linalg;
 mod lobes;
 pub mod model;
 pub mod names;
@@ -33,7 +33,7 @@ mod uncertainty;
 
 pub use curve::{Curve, CurveError};
 pub use format::{Caution, FILE_NAME};
-pub use knots::{Knots, Place};
+pub use knots::{KnotPosition, Knots};
 pub use library::{Cartridge, Dots, Entry, Library, Origins};
 pub use lobes::{Lobe, Lobes};
 pub use open::LibraryError;

@@ -96,7 +96,7 @@ pub struct Origins {
 
 impl Origins {
     /// Counts these curves.
-    pub fn of<'a>(entries: impl IntoIterator<Item = &'a Entry>) -> Origins {
+    pub fn count<'a>(entries: impl IntoIterator<Item = &'a Entry>) -> Origins {
         let mut counted = Origins::default();
         for entry in entries {
             match &entry.provenance {
@@ -139,7 +139,7 @@ impl Library {
 
     /// How many of its curves are measured, predicted and modelled.
     pub fn origins(&self) -> Origins {
-        Origins::of(&self.entries)
+        Origins::count(&self.entries)
     }
 
     /// The stacks; number 0 is the bare substrate.

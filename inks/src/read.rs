@@ -4,15 +4,16 @@
 //! stops the reading early. A library with errors is not returned.
 
 mod curves;
+pub(crate) mod fields;
 
 use std::f64::consts::FRAC_PI_2;
-use std::io::Read;
 use std::path::Path;
 
 use protocol::ink::Ink;
 use toml::Spanned;
 
-use self::curves::Measured;
+use self::curves::{Listing, ReadCurve};
+use self::fields::{parse_stack, provenance, text};
 use crate::albedo::{self, Albedo, INCIDENCES};
 use crate::format::{DotsOf, DotsTable, FILE_NAME, FORMAT, File, InkTable, MOST_BYTES, MeasuredTable};
 use crate::judge;
@@ -25,10 +26,6 @@ use crate::stack::Stack;
 
 /// The most stacks: a sheet numbers them with a byte.
 pub(crate) const MOST_STACKS: usize = 256;
-/// The most layers: far more than can be printed, as a limit for hostile files.
-const MOST_LAYERS: usize = 16;
-/// The largest curve file, in bytes.
-pub(crate) const MOST_CURVE_BYTES: u64 = 16 << 20;
 /// A measured albedo up to this value is a calibration error; a larger one is not a reflectance.
 const CALIBRATION: f64 = 1.05;
 /// The largest dot gain, in um: two dots.
@@ -49,24 +46,6 @@ pub(crate) fn folder(folder: &Path, built_in: fn() -> Library) -> Found {
             (None, vec![problem])
         }
     }
-}
-
-/// Reads a text file of at most `most` bytes.
-pub(crate) fn text(path: &Path, most: u64) -> Result<String, String> {
-    let file = std::fs::File::open(path).map_err(|error| error.to_string())?;
-    let mut text = String::new();
-    file.take(most + 1).read_to_string(&mut text).map_err(|error| error.to_string())?;
-    if text.len() as u64 > most {
-        return Err(format!("the file is longer than {most} bytes"));
-    }
-    Ok(text)
-}
-
-/// A listed stack and its position in the text.
-struct Listing {
-    stack: Stack,
-    offset: Option<usize>,
-    measured: Option<Measured>,
 }
 
 /// Reads the text of a library. The library of a folder can have curves and be based on the built-in one; the built-in
@@ -114,7 +93,7 @@ struct Parts {
 }
 
 impl Parts {
-    fn of(base: Library) -> Parts {
+    fn from_base(base: Library) -> Parts {
         Parts {
             name: Some(format!("{}, changed", base.name)),
             about: Some("Modelled where it was not measured.".into()),
@@ -140,7 +119,7 @@ fn build(
     folder: Option<&Path>,
     findings: &mut Findings,
 ) -> Option<Library> {
-    let mut parts = base.map_or_else(Parts::default, Parts::of);
+    let mut parts = base.map_or_else(Parts::default, Parts::from_base);
     // Only the figures of this text are checked; those of a base were checked when it was read.
     if let Some(paper) = file.paper {
         ranges("paper", &paper.figures(), findings);
@@ -287,22 +266,6 @@ fn listed_stacks(texts: &[Spanned<String>], findings: &mut Findings) -> Vec<List
     wanted
 }
 
-/// Parses a stack, and reports an error if that fails.
-fn parse_stack(text: &str, field: &str, offset: usize, findings: &mut Findings) -> Option<Stack> {
-    match text.parse::<Stack>() {
-        Ok(stack) if stack.layers().len() <= MOST_LAYERS => Some(stack),
-        Ok(stack) => {
-            let problem = format!("{} layers; the limit is {MOST_LAYERS}", stack.layers().len());
-            findings.error(Some(offset), field, problem);
-            None
-        }
-        Err(error) => {
-            findings.error(Some(offset), field, error.to_string());
-            None
-        }
-    }
-}
-
 fn ranges(owner: &str, figures: &[Listed<'_>], findings: &mut Findings) {
     for (name, [least, most], value) in figures {
         if let Some(number) = value.numbers().into_iter().find(|n| !(*least..=*most).contains(n)) {
@@ -407,20 +370,6 @@ fn dots(tables: Vec<Spanned<DotsTable>>, parts: &mut Parts, findings: &mut Findi
     }
 }
 
-/// Checks who, when and how.
-fn provenance(owner: &str, what: &str, [by, when, setup]: [&Spanned<String>; 3], findings: &mut Findings) {
-    for (name, value) in [("by", by), ("when", when), ("setup", setup)] {
-        if value.get_ref().trim().is_empty() {
-            let problem = format!("is empty; a {what} needs who, when and how");
-            findings.error(Some(value.span().start), format!("{owner}.{name}"), problem);
-        }
-    }
-    if !is_date(when.get_ref()) {
-        let problem = format!("`{}` is not a date; expected YYYY-MM-DD or YYYY-MM", when.get_ref());
-        findings.error(Some(when.span().start), format!("{owner}.when"), problem);
-    }
-}
-
 /// Each rule replaces the one with its name, or is appended.
 fn merge_rules(given: Vec<Spanned<Rule>>, rules: &mut Vec<Rule>, findings: &mut Findings) {
     let mut seen: Vec<String> = Vec::new();
@@ -435,22 +384,6 @@ fn merge_rules(given: Vec<Spanned<Rule>>, rules: &mut Vec<Rule>, findings: &mut 
             None => rules.push(rule),
         }
     }
-}
-
-/// `YYYY-MM` or `YYYY-MM-DD`, with a month and a day that exist in some year.
-fn is_date(text: &str) -> bool {
-    let number = |part: &str, digits: usize| -> Option<u32> {
-        (part.len() == digits && part.bytes().all(|b| b.is_ascii_digit())).then(|| part.parse().ok())?
-    };
-    let parts: Vec<&str> = text.split('-').collect();
-    let (year, month, day) = match parts[..] {
-        [year, month] => (year, month, "01"),
-        [year, month, day] => (year, month, day),
-        _ => return false,
-    };
-    number(year, 4).is_some()
-        && number(month, 2).is_some_and(|month| (1..=12).contains(&month))
-        && number(day, 2).is_some_and(|day| (1..=31).contains(&day))
 }
 
 /// Angles at which a modelled curve is tabulated: the square-root grid from 0 to 89.6 degrees. Lobes grow as 1 / cos toward
@@ -472,7 +405,7 @@ fn entry(
     let Listing { stack, offset, measured } = want;
     let field = format!("stack {stack}");
     let (curve, uncertainty, lobes, provenance) = match measured {
-        Some(Measured { curve, uncertainty, provenance, file }) => {
+        Some(ReadCurve { curve, uncertainty, provenance, file }) => {
             if provenance.is_measured() {
                 judge::curve(&stack, &file, &curve, uncertainty.as_ref(), findings);
             }
@@ -492,7 +425,7 @@ fn entry(
     for (quadrature, degrees) in quadratures.iter().zip(INCIDENCES) {
         let albedo = match &lobes {
             Some(lobes) => quadrature.sum(|t| lobes.at(t)),
-            None => quadrature.of(&curve),
+            None => quadrature.of_curve(&curve),
         };
         let albedo = albedo.into_iter().fold(0.0, f64::max);
         if albedo > 1.0 {

@@ -55,7 +55,7 @@ pub enum Kind {
     Finish,
 }
 
-struct Row {
+struct InkRow {
     ink: Ink,
     name: &'static str,
     short: &'static str,
@@ -73,11 +73,11 @@ const fn row(
     barcode: u8,
     part: &'static str,
     kind: Kind,
-) -> Row {
-    Row { ink, name, short, code, barcode, part, kind }
+) -> InkRow {
+    InkRow { ink, name, short, code, barcode, part, kind }
 }
 
-const TABLE: [Row; 13] = [
+const TABLE: [InkRow; 13] = [
     row(Ink::Black, "black", "K", 0x00, 0, "MDC-FLCK", Kind::Process),
     row(Ink::Cyan, "cyan", "C", 0x01, 3, "MDC-FLCC", Kind::Process),
     row(Ink::Magenta, "magenta", "M", 0x02, 2, "MDC-FLCM", Kind::Process),
@@ -105,7 +105,7 @@ impl Ink {
         all
     };
 
-    fn row(self) -> &'static Row {
+    fn row(self) -> &'static InkRow {
         &TABLE[self as usize]
     }
 

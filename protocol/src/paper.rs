@@ -28,7 +28,7 @@ pub enum Paper {
     Postcard,
 }
 
-struct Row {
+struct PaperRow {
     paper: Paper,
     name: &'static str,
     code: u8,
@@ -37,13 +37,13 @@ struct Row {
     top: u16,
 }
 
-const TABLE: [Row; 6] = [
-    Row { paper: Paper::Executive, name: "executive", code: 1, width: 4190, length: 5660, top: 284 },
-    Row { paper: Paper::Letter, name: "letter", code: 2, width: 4940, length: 5960, top: 284 },
-    Row { paper: Paper::Legal, name: "legal", code: 3, width: 4940, length: 7760, top: 284 },
-    Row { paper: Paper::A4, name: "a4", code: 4, width: 4800, length: 6372, top: 284 },
-    Row { paper: Paper::B5, name: "b5", code: 5, width: 4138, length: 5430, top: 284 },
-    Row { paper: Paper::Postcard, name: "postcard", code: 6, width: 2202, length: 3082, top: 71 },
+const TABLE: [PaperRow; 6] = [
+    PaperRow { paper: Paper::Executive, name: "executive", code: 1, width: 4190, length: 5660, top: 284 },
+    PaperRow { paper: Paper::Letter, name: "letter", code: 2, width: 4940, length: 5960, top: 284 },
+    PaperRow { paper: Paper::Legal, name: "legal", code: 3, width: 4940, length: 7760, top: 284 },
+    PaperRow { paper: Paper::A4, name: "a4", code: 4, width: 4800, length: 6372, top: 284 },
+    PaperRow { paper: Paper::B5, name: "b5", code: 5, width: 4138, length: 5430, top: 284 },
+    PaperRow { paper: Paper::Postcard, name: "postcard", code: 6, width: 2202, length: 3082, top: 71 },
 ];
 
 /// Left margin of every paper, in dots.
@@ -58,7 +58,7 @@ impl Paper {
         TABLE.iter().map(|row| row.paper)
     }
 
-    fn row(self) -> Option<&'static Row> {
+    fn row(self) -> Option<&'static PaperRow> {
         TABLE.iter().find(|row| row.paper == self)
     }
 

@@ -30,7 +30,7 @@ pub struct NotAStatus;
 
 /// What a cartridge place holds.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Place {
+pub enum CartridgePlace {
     /// Nothing.
     Empty,
     /// A cartridge with this barcode.
@@ -125,19 +125,19 @@ impl Status {
 
     /// The places: upper 1 to 4, lower 1 to 4, carriage. The carousel turns, so find a cartridge by its barcode and not by
     /// its place.
-    pub fn places(&self) -> [Place; PLACES] {
+    pub fn places(&self) -> [CartridgePlace; PLACES] {
         self.entries.map(|entry| match (entry, entry & 0x3f) {
-            (0xff, _) => Place::Empty,
-            (0x00..0x40, barcode) => Place::Loaded(barcode),
-            (0x40..0x80, barcode) => Place::Backwards(barcode),
-            (0x80..0xc0, barcode) => Place::AtEnd(barcode),
-            _ => Place::Empty,
+            (0xff, _) => CartridgePlace::Empty,
+            (0x00..0x40, barcode) => CartridgePlace::Loaded(barcode),
+            (0x40..0x80, barcode) => CartridgePlace::Backwards(barcode),
+            (0x80..0xc0, barcode) => CartridgePlace::AtEnd(barcode),
+            _ => CartridgePlace::Empty,
         })
     }
 
     /// Whether a usable cartridge of this ink is loaded; `None` while the printer is in error, for then it does not tell.
     pub fn has(&self, ink: Ink) -> Option<bool> {
-        (!self.in_error()).then(|| self.places().contains(&Place::Loaded(ink.barcode())))
+        (!self.in_error()).then(|| self.places().contains(&CartridgePlace::Loaded(ink.barcode())))
     }
 
     /// The errors that the printer reports; none unless it is in error.
@@ -194,8 +194,8 @@ mod tests {
         {
             assert_eq!(status.has(ink), Some(there));
         }
-        assert_eq!(status.places()[1], Place::Loaded(3));
-        assert_eq!(status.places()[8], Place::Empty);
+        assert_eq!(status.places()[1], CartridgePlace::Loaded(3));
+        assert_eq!(status.places()[8], CartridgePlace::Empty);
     }
 
     #[test]

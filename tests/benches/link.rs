@@ -6,8 +6,8 @@
 //! the time this thread has spent on a processor (Linux only), the waiting for the link left out.
 
 use bridge::engine::{Engine, Identity, Memory};
-use device::send::session::{Outcome, Record, Session};
-use device::send::transport::{Socket, Transport, pair};
+use device::connection::transport::{Socket, Transport, pair};
+use device::transit::session::{Outcome, Record, Session};
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{Ask, JobKind, Lines, ToBridge, ToHost};
 use protocol::runs::Decoder;
@@ -42,7 +42,7 @@ fn main() {
 /// A pseudo-terminal, which is what a serial port on USB is to the host.
 #[cfg(unix)]
 mod terminal {
-    use device::send::transport::{Serial, Transport};
+    use device::connection::transport::{Serial, Transport};
     use serialport::{SerialPort as _, TTYPort};
     use std::io::{ErrorKind, Read as _, Result, Write as _};
     use std::time::Duration;

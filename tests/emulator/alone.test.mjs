@@ -14,7 +14,7 @@ test('a stored job is printed with no cable to a host, by the button, again and 
   let bench = new Bench();
   await bench.connect('bulk');
   const { room, total } = await bench.stored();
-  // 2 MiB, of which 128 KiB are the image's and two sectors the diary's.
+  // 2 MiB, of which 128 KiB are the image's and two sectors the printer log's.
   assert.equal(total, 14 * 252 + (480 - 2 - 1) * 15 * 252);
   assert.equal(room, total);
   assert.equal((await bench.store(5, STREAMS, job('small.streams'), 'small')).state, 'stored');

@@ -2,11 +2,12 @@
 
 use appearance::gamut::InkMix;
 use appearance::weights::{ONE, WeightMaps, quantise};
+use halftone::{Method, Settings, halftone};
 use inks::Stack;
 use observe::Silent;
-use press::halftone::{Method, Settings, halftone};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
+use sheet::DotMap;
 use std::sync::OnceLock;
 
 /// Dots across an A4 page.
@@ -33,13 +34,25 @@ pub fn clustered(size: (usize, usize), scale: (f64, f64), paper: Paper) -> Vec<V
 }
 
 /// The same by another method.
-pub fn halftoned(
+pub fn halftoned(method: Method, size: (usize, usize), scale: (f64, f64), paper: Paper) -> Vec<Vec<u8>> {
+    let map = dots(method, &Ink::ALL[..8], size, scale, paper);
+    (1..9u8)
+        .map(|ink| {
+            let dots = map.index().chunks_exact(8);
+            dots.map(|dots| dots.iter().fold(0, |byte, &stack| byte << 1 | u8::from(stack == ink))).collect()
+        })
+        .collect()
+}
+
+/// A stack of each of these inks and the bare paper over a whole page.
+pub fn dots(
     method: Method,
+    inks: &[Ink],
     (width, height): (usize, usize),
     scale: (f64, f64),
     paper: Paper,
-) -> Vec<Vec<u8>> {
-    let count = 9;
+) -> DotMap {
+    let count = inks.len() + 1;
     let mut data = vec![0; width * height * count];
     for (pixel, out) in data.chunks_exact_mut(count).enumerate() {
         let (x, y) = ((pixel % width) as f64 / scale.0, (pixel / width) as f64 / scale.1);
@@ -48,18 +61,11 @@ pub fn halftoned(
             .collect();
         quantise(&weights, out);
     }
-    let stacks =
-        std::iter::once(Stack::SUBSTRATE).chain(Ink::ALL[..8].iter().map(|&ink| Stack::new(vec![ink])));
+    let stacks = std::iter::once(Stack::SUBSTRATE).chain(inks.iter().map(|&ink| Stack::new(vec![ink])));
     let matrix = (0..count).map(|i| (0..count).map(|j| if i == j { ONE } else { 0 }).collect()).collect();
     let maps = WeightMaps::new(width, height, count, data).expect("quantised");
     let mix = InkMix { stacks: stacks.collect(), maps, matrix };
     let page = (paper.width(), paper.length());
     let settings = Settings { method, ..Settings::uniform(count, 8) };
-    let map = halftone(&mix, page, None, &settings, &Silent).expect("a page");
-    (1..9u8)
-        .map(|ink| {
-            let dots = map.index().chunks_exact(8);
-            dots.map(|dots| dots.iter().fold(0, |byte, &stack| byte << 1 | u8::from(stack == ink))).collect()
-        })
-        .collect()
+    halftone(&mix, page, None, &settings, &Silent).expect("a page")
 }

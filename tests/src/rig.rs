@@ -14,13 +14,14 @@ use std::time::{Duration, Instant};
 use bridge::port::Timing;
 use observe::Silent;
 use press::job::stream::write_job;
-use press::separate::{Pass, Plane};
+use press::separate::Pass;
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 use protocol::rgl::Page;
 use rig::{Order, ROOM, Report, SAMPLE_NS, Shortest, Status, WORDS, checksum, samples, shortest};
 use serde::Deserialize;
 use serialport::SerialPort;
+use sheet::Plane;
 
 /// A scenario takes a second or two; an emulated one on a busy machine some more.
 const PATIENCE: Duration = Duration::from_secs(120);

@@ -12,7 +12,7 @@ use bridge::alone::Alone;
 use bridge::button::Press;
 use bridge::engine::{Checkpoint, Engine, Identity, Memory, Outcome, Task};
 use bridge::store::{Flash, SECTOR};
-use device::send::transport::{Socket, Transport};
+use device::connection::transport::{Socket, Transport};
 use press::simulate::{Carousel, Cartridge, Lever, Printer, STATUS_LENGTH, Trouble};
 use protocol::ink::Ink;
 use protocol::link::frame::{MAX, Reader};

@@ -1,21 +1,22 @@
 //! `cargo xtask test`: everything that has to pass before anything lands.
 //!
-//! Every step runs, whatever failed before, and has its time said. At the end stand the tests that were left out because
-//! something is missing on this computer ([`needs`]), and the steps that failed.
+//! Every step runs, whatever failed before, and has its time said. What the tests need is fetched and built beside the lints, for much
+//! of that is waiting; the tests then run together, those on the emulator and in the browser beside the others. At the end
+//! stand the seconds of each step, the slowest tests, the tests that were left out because something is missing on this computer
+//! ([`needs`]), and the steps that failed.
 
 use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
-use std::process::{Command, ExitCode};
+use std::process::ExitCode;
+use std::sync::Mutex;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
 
-use crate::firmware::{self, BARE_METAL};
-use crate::{PROGRAM, cargo, command, emulator, package, preview, queue, succeed};
-
-/// What the property tests' cases are drawn from.
-const PROPERTY_SEED: &str = "PROPTEST_RNG_SEED";
+use crate::firmware::BARE_METAL;
+use crate::runner::{self, Runner};
+use crate::{cargo, command, emulator, package, preview, queue, succeed};
 
 /// Names the list of tests that were left out; `.cargo/config.toml` sets it.
 const SKIPS: &str = "FOILPRESS_SKIPS";
@@ -23,71 +24,117 @@ const SKIPS: &str = "FOILPRESS_SKIPS";
 /// What is built for itself, besides the workspace of all others.
 const WORKSPACES: [&str; 3] = ["bridge/firmware", "tests/rig/firmware", "fuzz"];
 
-/// The steps that failed.
+/// Tests whose times are shown.
+const SLOWEST: usize = 10;
+
+/// The steps so far: their names, seconds, and whether they passed.
 #[derive(Default)]
 struct Gate {
-    failed: Vec<&'static str>,
+    steps: Mutex<Vec<(&'static str, f64, bool)>>,
 }
 
 impl Gate {
-    fn step(&mut self, name: &'static str, run: impl FnOnce() -> Result<()>) {
+    fn step<T>(&self, name: &'static str, run: impl FnOnce() -> Result<T>) -> Option<T> {
         eprintln!("== {name}");
         let start = Instant::now();
         let result = run();
-        let seconds = start.elapsed().as_secs();
-        match result {
-            Ok(()) => eprintln!("== {name}: passed in {seconds} s"),
-            Err(error) => {
-                eprintln!("== {name}: FAILED after {seconds} s: {error:#}");
-                self.failed.push(name);
-            }
+        let seconds = start.elapsed().as_secs_f64();
+        match &result {
+            Ok(_) => eprintln!("== {name}: passed in {seconds:.0} s"),
+            Err(error) => eprintln!("== {name}: FAILED after {seconds:.0} s: {error:#}"),
         }
+        self.lock().push((name, seconds, result.is_ok()));
+        result.ok()
     }
 
-    fn command(&mut self, name: &'static str, mut command: Command) {
-        self.step(name, || succeed(&mut command));
+    fn lock(&self) -> std::sync::MutexGuard<'_, Vec<(&'static str, f64, bool)>> {
+        self.steps.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+
+    fn failed(&self) -> Vec<&'static str> {
+        self.lock().iter().filter(|(_, _, passed)| !passed).map(|(name, _, _)| *name).collect()
     }
 }
 
 /// Runs every step.
-pub fn run(root: &Path) -> ExitCode {
+pub fn run(root: &Path, is_full: bool) -> ExitCode {
     let start = Instant::now();
-    let mut gate = Gate::default();
+    let gate = Gate::default();
     gate.step("list of skipped tests", clear_skips);
+    let mut runner = Runner::find(root, is_full);
+    let repeat = runner.draw();
+    eprintln!("{repeat}");
+    let brought = std::thread::scope(|scope| {
+        let brought = scope.spawn(|| bring(root, &gate));
+        gate.step("format", || {
+            std::iter::once("").chain(WORKSPACES).try_for_each(|workspace| {
+                succeed(cargo(&["fmt", "--all", "--check"]).current_dir(root.join(workspace)))
+            })
+        });
+        gate.step("lints", || {
+            succeed(&mut cargo(&[
+                "clippy",
+                "--workspace",
+                "--all-targets",
+                "--locked",
+                "--",
+                "-D",
+                "warnings",
+            ]))
+        });
+        gate.step("documentation", || {
+            let mut doc = cargo(&["doc", "--workspace", "--no-deps", "--locked"]);
+            succeed(doc.env("RUSTDOCFLAGS", "-D warnings"))
+        });
+        // Every step builds for the same packages, so that nothing is built twice with other features.
+        gate.step("building the tests", || runner.build());
+        brought.join().unwrap_or_default()
+    });
+    runner.name(brought);
+    let summary = gate.step("tests", || runner.all());
+    gate.step("examples of the documentation", || runner::documentation(root));
+    // The package is tried with the tests of print queues: where they fail, it would.
+    if gate.failed().is_empty() {
+        gate.step("package", || package::run_where_possible(root, &runner.program()));
+    }
+    report(&gate, &runner.slowest(), summary.as_deref(), &repeat);
+    let minutes = start.elapsed().as_secs_f64() / 60.0;
+    let failed = gate.failed();
+    if failed.is_empty() {
+        eprintln!("all steps passed in {minutes:.1} minutes");
+        ExitCode::SUCCESS
+    } else {
+        eprintln!("failed after {minutes:.1} minutes: {}", failed.join(", "));
+        ExitCode::FAILURE
+    }
+}
+
+/// Fetches and builds what tests need beside Rust; returns what is to be named to them.
+fn bring(root: &Path, gate: &Gate) -> Vec<(&'static str, std::ffi::OsString)> {
     // Where this fails, the tests that need it are skipped, or fail where they are required.
     if let Err(error) = queue::install() {
         eprintln!("print queues and PDF: {error:#}");
     }
-    gate.command("bare-metal targets", command("rustup", &[&["target", "add"][..], &BARE_METAL].concat()));
-    gate.step("format", || {
-        std::iter::once(Path::new("")).chain(WORKSPACES.map(Path::new)).try_for_each(|workspace| {
-            succeed(cargo(&["fmt", "--all", "--check"]).current_dir(root.join(workspace)))
-        })
+    gate.step("bare-metal targets", || {
+        succeed(&mut command("rustup", &[&["target", "add"][..], &BARE_METAL].concat()))
     });
-    gate.command(
-        "lints",
-        cargo(&["clippy", "--workspace", "--all-targets", "--locked", "--", "-D", "warnings"]),
-    );
-    gate.step("lints of the firmware", || firmware::lint(root));
-    let mut doc = cargo(&["doc", "--workspace", "--no-deps", "--locked"]);
-    doc.env("RUSTDOCFLAGS", "-D warnings");
-    gate.command("documentation", doc);
-    // Every later step builds for the same packages, so that nothing is built twice with other features.
-    let program = firmware::workspace_target(root).join("debug/foilpress");
-    let mut test = cargo(&["test", "--workspace", "--locked", "--no-fail-fast"]);
-    test.env(PROGRAM, &program);
-    // The gate answers the same for the same tree; `cargo test` by itself goes on looking at new cases.
-    if std::env::var_os(PROPERTY_SEED).is_none() {
-        test.env(PROPERTY_SEED, "1");
-    }
-    gate.command("tests", test);
-    gate.step("emulator", || emulator::run(root, &program));
-    gate.step("preview", || preview::run(root));
-    // The package is tried with the tests of print queues: where they fail, it would.
-    if gate.failed.is_empty() {
-        gate.step("package", || package::run_where_possible(root, &program));
-    }
+    let browser = gate.step("browser and its scripts", || preview::bring(root));
+    let emulator = gate.step("firmware with its lints, and emulator", || emulator::bring(root));
+    [browser, emulator].into_iter().flatten().flatten().collect()
+}
 
+/// Says what took how long, what was left out, and how to repeat the run.
+fn report(gate: &Gate, slowest: &[(f64, String)], summary: Option<&str>, repeat: &str) {
+    eprintln!("== seconds of each step:");
+    for (name, seconds, passed) in gate.lock().iter() {
+        eprintln!("   {seconds:>6.0}  {name}{}", if *passed { "" } else { "  FAILED" });
+    }
+    if !slowest.is_empty() {
+        eprintln!("== the slowest tests, in seconds:");
+    }
+    for (seconds, name) in slowest.iter().take(SLOWEST) {
+        eprintln!("   {seconds:>6.1}  {name}");
+    }
     match skips() {
         Ok(list) if list.is_empty() => eprintln!("== no test was skipped"),
         Ok(list) => {
@@ -96,13 +143,9 @@ pub fn run(root: &Path) -> ExitCode {
         }
         Err(error) => eprintln!("== {error:#}"),
     }
-    let minutes = start.elapsed().as_secs_f64() / 60.0;
-    if gate.failed.is_empty() {
-        eprintln!("all steps passed in {minutes:.1} minutes");
-        ExitCode::SUCCESS
-    } else {
-        eprintln!("failed: {}", gate.failed.join(", "));
-        ExitCode::FAILURE
+    eprintln!("{repeat}");
+    if let Some(summary) = summary {
+        eprintln!("{summary}");
     }
 }
 

@@ -2,6 +2,8 @@
 //!
 //! `cargo xtask test` is the whole gate ([`gate`]); the other tasks are its steps and what people do by hand.
 
+#[cfg(test)]
+mod documents;
 mod elf;
 mod emulator;
 mod firmware;
@@ -9,6 +11,7 @@ mod gate;
 mod package;
 mod preview;
 mod queue;
+mod runner;
 mod tools;
 
 use std::path::Path;
@@ -27,7 +30,11 @@ struct Args {
 #[derive(Subcommand)]
 enum Task {
     /// Run everything that has to pass: format, lints, documents, all tests, emulator, print queues, package
-    Test,
+    Test {
+        /// Run the commands of documents and help as they stand, and sixteen times as many cases of each property: about an hour
+        #[arg(long)]
+        full: bool,
+    },
     /// Run the benchmarks
     Bench,
     /// Build the bridge's firmware as UF2 and check its size against bridge/firmware/budget.toml
@@ -57,13 +64,13 @@ fn main() -> ExitCode {
     // The workspace, wherever this was started from: it is the folder above this package.
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."));
     match Args::parse().task {
-        Task::Test => gate::run(root),
+        Task::Test { full } => gate::run(root, full),
         Task::Bench => finish(succeed(&mut cargo(&["bench", "--workspace", "--locked"]))),
         Task::Firmware => finish(firmware::build(root).and_then(|_| firmware::build_rig(root)).map(drop)),
         Task::Emulator { serve: true } => finish(emulator::serve(root)),
         Task::Emulator { serve: false } => finish(emulator::alone(root)),
         Task::Preview => finish(preview::run(root)),
-        Task::Queue => finish(queue::run()),
+        Task::Queue => finish(queue::run(root)),
         Task::Package { dev: false } => finish(package::build(root, package::Profile::Release)),
         Task::Package { dev: true } => finish(package::build(root, package::Profile::Dev)),
     }

@@ -4,39 +4,45 @@
 //! mouse, touch and keyboard. The browser is Debian's, drawing in software.
 
 use std::env;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
 use anyhow::{Context as _, Result, bail};
 use needs::Need;
 
+use crate::runner::Runner;
 use crate::tools::{self, Node};
-use crate::{cargo, command, firmware, succeed};
+use crate::{command, firmware, succeed};
 
 const CHROMIUM: &str = "chromium";
 const ESLINT: &str = "tests/browser/node_modules/eslint/bin/eslint.js";
 
-/// Runs the tests, or leaves them out where browser or Node cannot be had.
+/// The tests in a browser by themselves.
 pub fn run(root: &Path) -> Result<()> {
+    let mut runner = Runner::find(root, false);
+    runner.name(bring(root)?);
+    runner.only("browser").map(drop)
+}
+
+/// Checks the scripts and names what the tests need; nothing where browser or Node cannot be had, which has then been said.
+pub fn bring(root: &Path) -> Result<Vec<(&'static str, OsString)>> {
     let folder = firmware::target(root);
     std::fs::create_dir_all(&folder).with_context(|| format!("{} cannot be made", folder.display()))?;
     let scripts = root.join("tests/browser");
     let node = match Node::find(&folder).and_then(|node| install().map(|()| node)) {
         Ok(node) => node,
-        Err(missing) => return tools::skip(Need::Browser, &format!("{missing:#}")),
+        Err(missing) => return tools::skip(Need::Browser, &format!("{missing:#}")).map(|()| Vec::new()),
     };
-    let install = ["ci", "--no-audit", "--no-fund", "--ignore-scripts", "--loglevel=error"];
-    succeed(node.command("npm", &install).current_dir(&scripts))?;
+    node.install(&scripts)?;
     succeed(node.command("npm", &["exec", "--", "tsc", "--project", "."]).current_dir(&scripts))?;
     let lint = [ESLINT, "--config", "tests/browser/eslint.config.js", "--max-warnings", "0", "host", "tests"];
     succeed(node.command("node", &lint).current_dir(root))?;
-    let args = ["test", "--workspace", "--test", "browser", "--locked", "--", "--test-threads=1"];
-    let mut test = cargo(&args);
-    test.current_dir(root)
-        .env("FOILPRESS_CHROMIUM", found()?)
-        .env("FOILPRESS_NODE", &node.program)
-        .env("FOILPRESS_BROWSER", &scripts);
-    succeed(&mut test)
+    Ok(vec![
+        ("FOILPRESS_CHROMIUM", found()?.into()),
+        ("FOILPRESS_NODE", node.program.into()),
+        ("FOILPRESS_BROWSER", scripts.into()),
+    ])
 }
 
 /// Where the browser is.

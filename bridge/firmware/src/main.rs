@@ -25,10 +25,10 @@ mod alone;
 mod board;
 mod fault;
 mod flash;
-mod keep;
 mod log;
 mod pins;
 mod port;
+mod retained;
 mod shared;
 mod stack;
 mod strobe;
@@ -91,7 +91,7 @@ async fn main(spawner: Spawner) {
     let watchdog = watch::start(peripherals.WATCHDOG);
 
     // Before the first word of the log, and before a byte goes to the printer.
-    let (keeper, checkpoint, known) = keep::keeper();
+    let (checkpoints, checkpoint, known) = retained::checkpoints();
     let used_before = stack::used();
     stack::fill();
 
@@ -180,12 +180,12 @@ async fn main(spawner: Spawner) {
         [first, second],
         (peripherals.DMA_CH0, peripherals.DMA_CH1),
     );
-    strobe.set_place(keeper.place());
+    strobe.set_place(checkpoints.place());
     // The pins went to the PIO block and had no driver meanwhile. The cable has not seen it: the driver enables the buffers.
     pins::bring_up();
 
     static DRIVER: StaticCell<port::PicoDriver> = StaticCell::new();
-    let driver = DRIVER.init_with(|| port::driver(strobe, keeper));
+    let driver = DRIVER.init_with(|| port::driver(strobe, checkpoints));
 
     static SERIAL: StaticCell<[u8; 16]> = StaticCell::new();
     let serial_number = hex(&number, SERIAL.init([0; 16]));

@@ -1,14 +1,14 @@
 //! The task at the port: runs the library's [`Driver`] on this board.
 
 use crate::board;
-use crate::keep::Keeper;
 use crate::pins::{self, Ack, Data, Line};
+use crate::retained::CheckpointStore;
 use crate::shared::{Shared, Side};
 use crate::strobe::{SENT, Strobe};
 use crate::watch::{self, Life};
+use bridge::checkpoint::MARKS;
 use bridge::driver::{self, Clock, Driver, Event, Retained, Sender};
 use bridge::engine::Checkpoint;
-use bridge::keeper::MARKS;
 use bridge::port::{Port, Timing};
 use embassy_futures::select::select3;
 use embassy_futures::yield_now;
@@ -31,14 +31,14 @@ pub type PicoDriver = Driver<Pico, Data, Line, Line, Ack, Cycles>;
 /// What the driver needs of the board.
 pub struct Pico {
     strobe: Strobe,
-    keeper: Keeper,
+    checkpoints: CheckpointStore,
     /// Bytes that the processor has sent since the last checkpoint.
     marked: usize,
 }
 
 /// A driver around the strobe engine. The lines come to rest.
-pub fn driver(strobe: Strobe, keeper: Keeper) -> PicoDriver {
-    Driver::new(Pico { strobe, keeper, marked: 0 }, Port::new(pins::port(), Cycles))
+pub fn driver(strobe: Strobe, checkpoints: CheckpointStore) -> PicoDriver {
+    Driver::new(Pico { strobe, checkpoints, marked: 0 }, Port::new(pins::port(), Cycles))
 }
 
 impl Clock for Pico {
@@ -83,16 +83,16 @@ impl Sender for Pico {
 
 impl Retained for Pico {
     fn mark(&mut self) {
-        self.keeper.mark(self.marked);
+        self.checkpoints.mark(self.marked);
         self.marked += 1;
     }
 
     fn store(&mut self, checkpoint: Checkpoint) {
         if self.marked > 0 {
-            self.strobe.set_place((self.keeper.place() + self.marked) % MARKS);
+            self.strobe.set_place((self.checkpoints.place() + self.marked) % MARKS);
             self.marked = 0;
         }
-        self.keeper.store(checkpoint, self.strobe.place());
+        self.checkpoints.store(checkpoint, self.strobe.place());
     }
 }
 

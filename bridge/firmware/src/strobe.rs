@@ -6,7 +6,7 @@
 //! Method: ten instructions, one byte each round. The program waits for Busy before it changes the data. Then it looks at
 //! Busy, PError, Select, nFault and the printer's +5 V together until all are well, and strobes three ticks later. Behind every strobe it
 //! pushes a word. A DMA channel takes these words away, and its counter *is* the number of bytes that have crossed. The
-//! words stay as marks in memory that survives a reset ([`crate::keep`]). A byte in a FIFO or half way through its setup is
+//! words stay as marks in memory that survives a reset ([`crate::retained`]). A byte in a FIFO or half way through its setup is
 //! not counted and can be taken back.
 //!
 //! One tick is an eighth of the longest time asked for and of one clock cycle more:
@@ -27,9 +27,9 @@
 //! port can do, the library's [`Port`](bridge::port::Port) works the same pins.
 
 use crate::pins;
-use crate::{board, keep};
+use crate::{board, retained};
+use bridge::checkpoint::{MARKS, MARKS_BITS};
 use bridge::driver::TwoBuffers;
-use bridge::keeper::{MARKS, MARKS_BITS};
 use bridge::port::Timing;
 use core::cell::RefCell;
 use core::sync::atomic::{Ordering, compiler_fence};
@@ -336,7 +336,7 @@ impl Strobe {
         board::abort(TALLY);
         while channel.ctrl_trig().read().busy() {}
         channel.read_addr().write_value(pac::PIO0.rxf(0).as_ptr() as u32);
-        channel.write_addr().write_value(keep::marks() as u32 + self.place as u32);
+        channel.write_addr().write_value(retained::marks() as u32 + self.place as u32);
         board::set_count(channel, COUNTER);
         channel.ctrl_trig().write(|w| {
             w.set_treq_sel(TreqSel::PIO0_RX0);

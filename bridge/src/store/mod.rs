@@ -20,14 +20,14 @@
 //! (400 at most), a page under 1 ms. Limits: [`MOST`] jobs; a name of [`NAME_MAX`] bytes.
 //! Why no library does this: `docs/decisions/print-alone.md`.
 
-mod diary;
 mod flash;
+mod printer_log;
 
-pub use diary::{Note, Standing};
 pub use flash::{Flash, NoFlash, PAGE, SECTOR};
+pub use printer_log::{Note, Standing};
 
-use diary::Diary;
 use heapless::{String, Vec};
+use printer_log::PrinterLog;
 use protocol::link::frame::checksum;
 use protocol::link::message::{JobKind, NAME_MAX};
 
@@ -129,8 +129,8 @@ pub struct Worn;
 /// The store.
 pub struct Store<F> {
     flash: F,
-    diary: Diary,
-    /// Sectors for jobs, behind those of the diary.
+    printer_log: PrinterLog,
+    /// Sectors for jobs, behind those of the printer log.
     sectors: u32,
     /// The oldest first.
     jobs: Vec<Stored, MOST>,
@@ -144,9 +144,10 @@ pub struct Store<F> {
 impl<F: Flash> Store<F> {
     /// Finds what is in the flash. Writes nothing.
     pub fn open(flash: F) -> Self {
-        let sectors = (flash.size() / SECTOR).saturating_sub(diary::SECTORS);
-        let diary = Diary::open(&flash);
-        let mut store = Store { flash, diary, sectors, jobs: Vec::new(), sequence: 1, next: 0, draft: None };
+        let sectors = (flash.size() / SECTOR).saturating_sub(printer_log::SECTORS);
+        let printer_log = PrinterLog::open(&flash);
+        let mut store =
+            Store { flash, printer_log, sectors, jobs: Vec::new(), sequence: 1, next: 0, draft: None };
         for sector in 0..sectors {
             let Some(head) = store.head(sector) else { continue };
             if head.sequence >= store.sequence {
@@ -308,13 +309,13 @@ impl<F: Flash> Store<F> {
 
     /// What was last written of the printer.
     pub fn note(&self) -> Note {
-        self.diary.last()
+        self.printer_log.last()
     }
 
     /// Writes where the printer stands, if that is news. Without an area nothing is written.
     pub fn write_note(&mut self, note: Note) {
         if self.sectors > 0 {
-            self.diary.write(&mut self.flash, note);
+            self.printer_log.write(&mut self.flash, note);
         }
     }
 
@@ -324,7 +325,7 @@ impl<F: Flash> Store<F> {
         let free = (0..self.sectors).map(|step| (self.next + step) % self.sectors);
         let sector = free.into_iter().find(|&sector| !self.is_used(sector, draft)).ok_or(Worn)?;
         self.blot(sector);
-        self.flash.erase(diary::SECTORS + sector);
+        self.flash.erase(printer_log::SECTORS + sector);
         if place == 0 {
             draft.stored.sector = sector;
         }
@@ -412,7 +413,7 @@ fn page_sum(page: &[u8; PAGE as usize], stored: &Stored, at: u32) -> u32 {
 }
 
 fn address(sector: u32) -> u32 {
-    (diary::SECTORS + sector) * SECTOR
+    (printer_log::SECTORS + sector) * SECTOR
 }
 
 fn seal_address(sector: u32) -> u32 {

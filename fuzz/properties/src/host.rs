@@ -4,8 +4,8 @@
 
 use super::frame::framed;
 use arbitrary::{Result, Unstructured};
-use device::send::session::{Outcome, Record, Session};
-use device::send::status::Status;
+use device::questions::status::Status;
+use device::transit::session::{Outcome, Record, Session};
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
     Defect, DefectKind, Fault, JobKind, JobState, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION,

@@ -1,12 +1,12 @@
 //! What is kept over restarts: any memory and any flash leave a bridge that starts, prints the next job, and reads back what it stores.
 //!
-//! The input fills the slots of the keeper and some sectors of the flash; records of both get right checksums as often as not, since chance
+//! The input fills the slots of the checkpoints and some sectors of the flash; records of both get right checksums as often as not, since chance
 //! does not hit those.
 
 use arbitrary::{Result, Unstructured};
 use bridge::alone::Alone;
+use bridge::checkpoint::{self, CheckpointStore, MARKS, PAST_SLOT, SLOT};
 use bridge::engine::{Engine, Identity, Memory, Outcome};
-use bridge::keeper::{self, Keeper, MARKS, PAST_SLOT, SLOT};
 use bridge::store::{Flash, Next, PAGE_DATA, SECTOR, Store};
 use protocol::link::frame::{Reader, checksum};
 use protocol::link::message::{JobKind, JobState, Lines, ToBridge};
@@ -21,7 +21,7 @@ pub fn check(bytes: &[u8]) {
     let mut script = Unstructured::new(bytes);
     let memory = Retained::new(&mut script);
     let flash = RefCell::new(flash(&mut script));
-    let (mut keeper, checkpoint) = Keeper::new(memory, true);
+    let (mut checkpoints, checkpoint) = CheckpointStore::new(memory, true);
 
     let (mut data, mut output, mut band, mut decoder) = ([0; 2100], [0; 2048], [0; 2048], Decoder::default());
     let memory = Memory { data: &mut data, output: &mut output, band: &mut band, decoder: &mut decoder };
@@ -35,7 +35,7 @@ pub fn check(bytes: &[u8]) {
         read(alone.store(), *stored);
     }
     engine.port(Lines::IDLE, None);
-    keeper.store(engine.checkpoint(), keeper.place());
+    checkpoints.store(engine.checkpoint(), checkpoints.place());
 
     // Whatever was there: once it is given up, a job goes through.
     let mut reader = Reader::new();
@@ -48,12 +48,12 @@ pub fn check(bytes: &[u8]) {
     // A host repeats itself: the bridge may have a reset to do first.
     for _ in 0..2 {
         tell(&mut engine, &ToBridge::Abandon { job: open });
-        run(&mut engine, &mut keeper, &mut alone);
+        run(&mut engine, &mut checkpoints, &mut alone);
     }
     let job = 0x00c0_ffee;
     tell(&mut engine, &ToBridge::Begin { job, kind: JobKind::Raw, length: 3 });
     tell(&mut engine, &ToBridge::Data { job, offset: 0, bytes: b"abc" });
-    run(&mut engine, &mut keeper, &mut alone);
+    run(&mut engine, &mut checkpoints, &mut alone);
     let taken = engine.checkpoint().past.iter().any(|past| past.job == job) || open == job;
     assert!(taken || engine.progress().state == JobState::Done, "{:?}", engine.progress());
 
@@ -61,7 +61,7 @@ pub fn check(bytes: &[u8]) {
 }
 
 /// The board does what it is told, and the printer takes everything.
-fn run(engine: &mut Engine<'_>, keeper: &mut Keeper<Retained>, alone: &mut Alone<Chip<'_>>) {
+fn run(engine: &mut Engine<'_>, checkpoints: &mut CheckpointStore<Retained>, alone: &mut Alone<Chip<'_>>) {
     for _ in 0..200 {
         engine.port(Lines::IDLE, None);
         bridge::turn::work(engine, || 0);
@@ -72,9 +72,9 @@ fn run(engine: &mut Engine<'_>, keeper: &mut Keeper<Retained>, alone: &mut Alone
         let count = engine.output().len().min(100);
         engine.consumed(count);
         for sent in 0..count {
-            keeper.mark(sent);
+            checkpoints.mark(sent);
         }
-        keeper.store(engine.checkpoint(), (keeper.place() + count) % MARKS);
+        checkpoints.store(engine.checkpoint(), (checkpoints.place() + count) % MARKS);
     }
 }
 
@@ -146,7 +146,7 @@ fn record(flash: &mut [u8], script: &mut Unstructured<'_>) -> Result<()> {
         }
         // What makes it count.
         1 => (sector + 256, words(&[0, id, length])),
-        // A record of the diary.
+        // A record of the printer log.
         2 => {
             let at = script.int_in_range(0..=100usize)? * 20;
             let numbers = [0, small(script)?, script.int_in_range(0..=3)?, id, length];
@@ -222,7 +222,7 @@ fn seal(slot: &mut [u8]) {
     slot[..4].copy_from_slice(&sum);
 }
 
-impl keeper::Memory for Retained {
+impl checkpoint::Memory for Retained {
     fn slots(&self) -> [[u8; SLOT]; 2] {
         self.slots
     }

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use appearance::brdf::Table;
 use appearance::document::Materials;
 use appearance::factor::Factored;
-use appearance::gamut::{GamutError, Intent, Printable, Settings, map};
+use appearance::gamut::{GamutError, GamutSettings, Intent, Printable, map};
 use appearance::weights::WeightMaps;
 use divan::{Bencher, black_box};
 use inks::{InkSet, Library};
@@ -37,7 +37,7 @@ fn run(bencher: Bencher, size: usize, intent: Intent) {
     let mut bases = Table::new(row.len());
     bases.push(&row.iter().map(|&f| f64::from(f)).collect::<Vec<_>>());
     let document = Factored { space: pixels.space().clone(), bases, maps: WeightMaps::uniform(size, size) };
-    let settings = Settings { intent, ..Settings::default() };
+    let settings = GamutSettings { intent, ..GamutSettings::default() };
     bencher.counter(divan::counter::ItemsCount::new(size * size)).bench_local(|| {
         let bases = || Ok::<_, GamutError>(Cow::Borrowed(&document));
         black_box(map(&pixels, bases, &printable, &settings, &Silent).unwrap())

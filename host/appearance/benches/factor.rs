@@ -6,7 +6,7 @@ use std::path::Path;
 
 use appearance::brdf::Space;
 use appearance::document::Materials;
-use appearance::factor::{Method, Settings, factor};
+use appearance::factor::{FactorSettings, Method, factor};
 use divan::Bencher;
 use observe::Silent;
 
@@ -83,7 +83,7 @@ impl Materials for Document {
 #[divan::bench(args = [Method::Kmeans, Method::Sacls, Method::Archetypes], sample_count = 1)]
 fn rusty_metal_in_eight_bases(bencher: Bencher, method: Method) {
     let document = Document::rusty();
-    let settings = Settings { method, bases: Some(8), ..Settings::default() };
+    let settings = FactorSettings { method, bases: Some(8), ..FactorSettings::default() };
     bencher.bench_local(|| {
         let report = factor(&document, &settings, &Silent).expect("the document is sound").report;
         eprintln!("{report:?}");
@@ -94,7 +94,8 @@ fn rusty_metal_in_eight_bases(bencher: Bencher, method: Method) {
 fn rusty_metal_in_as_many_bases_as_it_needs(bencher: Bencher) {
     let document = Document::rusty();
     bencher.bench_local(|| {
-        let report = factor(&document, &Settings::default(), &Silent).expect("the document is sound").report;
+        let report =
+            factor(&document, &FactorSettings::default(), &Silent).expect("the document is sound").report;
         eprintln!("{report:?}");
     });
 }

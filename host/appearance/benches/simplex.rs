@@ -8,7 +8,7 @@
 use appearance::brdf::{Space, Table};
 use appearance::document::Materials;
 use appearance::gamut::Printable;
-use appearance::solve::{Columns, Gram, Lanes, Simplex};
+use appearance::solve::{Columns, Gram, Simplex, SimplexBatch};
 use divan::{Bencher, black_box};
 use inks::{InkSet, Library};
 use protocol::ink::Ink;
@@ -91,7 +91,7 @@ fn solve_in_lanes(bencher: Bencher, k: usize) {
     h.chunks_exact_mut(k).zip(targets.rows()).for_each(|(h, t)| by_column.products(t, h));
     let typical: Vec<f64> = h.chunks_exact(k).step_by(PIXELS / 64).flatten().copied().collect();
     bencher.counter(divan::counter::ItemsCount::new(PIXELS)).bench_local(|| {
-        let mut lanes = Lanes::new(&gram, &typical).unwrap();
+        let mut lanes = SimplexBatch::new(&gram, &typical).unwrap();
         black_box(lanes.solve(&h, &mut a).unwrap());
     });
 }

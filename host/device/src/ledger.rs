@@ -16,6 +16,7 @@ use std::io::{self, BufRead as _, BufReader, Read as _, Seek as _, SeekFrom, Wri
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use files::durable;
 use press::job::cost::{Cost, Price};
 use protocol::ink::Ink;
 use serde::{Deserialize, Serialize};
@@ -152,7 +153,8 @@ impl Ledger {
         file.lock()?;
         let mut text = serde_json::to_vec(line)?;
         text.push(b'\n');
-        if file.seek(SeekFrom::End(0))? > 0 {
+        let is_new = file.seek(SeekFrom::End(0))? == 0;
+        if !is_new {
             file.seek(SeekFrom::End(-1))?;
             let mut last = [0];
             file.read_exact(&mut last)?;
@@ -162,7 +164,8 @@ impl Ledger {
             }
         }
         file.write_all(&text)?;
-        file.sync_all()
+        file.sync_all()?;
+        if is_new { durable::sync_folder(&self.folder) } else { Ok(()) }
     }
 
     /// Opens this user's file, which is made if need be. In a folder that everyone may write to, somebody else may have put a

@@ -5,8 +5,8 @@
 //! Method: a folder for the whole computer. Before the first byte of a job leaves, the file `open.PRINTER.JOB` is made durable
 //! there. It is removed when the job is known to have ended in an orderly way, or when the printer was reset. So a crash
 //! leaves it behind, whatever crashed. The folder is sticky: nobody can remove a file of another user. Whoever learns that
-//! another user's job has ended writes `closed.PRINTER.JOB` instead, which counts the same. Files appear under a temporary
-//! name and are renamed; links are never followed.
+//! another user's job has ended writes `closed.PRINTER.JOB` instead, which counts the same. Files are [durable]
+//! and whole; links are never followed.
 //! A bridge is known by its serial number, however it is reached, because it has one port. A raw device is known by its path.
 //! Limits: another computer that shares a bridge over the network does not see the folder. A user who may print may also
 //! write false facts here, as they may send false bytes to the printer: the worst that follows is a needless reset.
@@ -14,7 +14,7 @@
 
 use std::fmt;
 use std::fs::{self, File};
-use std::io::{self, Read as _, Write as _};
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -22,7 +22,8 @@ use protocol::link::frame::checksum;
 use protocol::link::message::{JobState, PastJob, Progress};
 use serde::{Deserialize, Serialize};
 
-use crate::send::journal::{Journal, JournalError};
+use crate::transit::journal::{Journal, JournalError};
+use files::durable::{self, Access};
 
 /// A fact is far smaller.
 const LARGEST: u64 = 4096;
@@ -172,7 +173,7 @@ impl Printers {
 
     /// The facts in this folder, which is made if need be.
     pub fn at(folder: &Path) -> Result<Printers, PrintersError> {
-        fs::create_dir_all(folder).map_err(io_error("make", folder))?;
+        durable::make_folder(folder).map_err(io_error("make", folder))?;
         Ok(Printers { folder: folder.to_path_buf(), instead_of: None })
     }
 
@@ -306,26 +307,12 @@ impl Printers {
     /// Puts a whole file under its name, readable for everyone whatever this user's mask is.
     fn write(&self, path: &Path, fact: &Fact) -> Result<(), PrintersError> {
         let text = serde_json::to_vec(fact).map_err(|error| io_error("write", path)(error.into()))?;
-        let put = || -> io::Result<()> {
-            let mut file = tempfile::Builder::new().prefix(".new.").tempfile_in(&self.folder)?;
-            file.write_all(&text)?;
-            #[cfg(unix)]
-            file.as_file().set_permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644))?;
-            file.as_file().sync_all()?;
-            file.persist(path).map_err(|error| error.error)?;
-            Ok(())
-        };
-        put().map_err(io_error("write", path))?;
-        self.sync()
+        durable::write(path, &text, Access::Everyone).map_err(io_error("write", path))
     }
 
-    /// Makes names durable, where the system has such a thing.
+    /// Makes removals durable.
     fn sync(&self) -> Result<(), PrintersError> {
-        #[cfg(unix)]
-        File::open(&self.folder)
-            .and_then(|folder| folder.sync_all())
-            .map_err(io_error("write", &self.folder))?;
-        Ok(())
+        durable::sync_folder(&self.folder).map_err(io_error("write", &self.folder))
     }
 
     /// Removes pairs that cancel out, as far as they are this user's.
@@ -366,7 +353,7 @@ fn shared_folder() -> Option<PathBuf> {
 /// Makes the folder all users share, for an administrator: everyone may add to it, and nobody remove what is another's.
 pub fn make_shared_folder() -> Result<(), PrintersError> {
     let Some(folder) = shared_folder() else { return Ok(()) };
-    fs::create_dir_all(&folder).map_err(io_error("make", &folder))?;
+    durable::make_folder(&folder).map_err(io_error("make", &folder))?;
     #[cfg(unix)]
     fs::set_permissions(&folder, std::os::unix::fs::PermissionsExt::from_mode(0o1777))
         .map_err(io_error("make", &folder))?;

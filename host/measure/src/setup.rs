@@ -101,7 +101,7 @@ pub struct Light {
 /// The shape of the sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Shape {
+pub enum SampleShape {
     /// Wrapped round a can.
     Cylinder,
     /// A flat sheet.
@@ -113,7 +113,7 @@ pub enum Shape {
 #[serde(deny_unknown_fields)]
 pub struct Sample {
     /// Its shape.
-    pub shape: Shape,
+    pub shape: SampleShape,
     /// Radius of the can with the print on it.
     pub radius_mm: Option<f64>,
     /// How far the radius may be off [default: 1.5 %].
@@ -298,12 +298,12 @@ impl Setup {
         };
         positive("sample.height_mm", self.sample.height_mm, 1e4)?;
         match (self.sample.shape, self.sample.radius_mm, self.sample.width_mm) {
-            (Shape::Cylinder, Some(radius), None) => positive("sample.radius_mm", radius, 1e4)?,
-            (Shape::Flat, None, Some(width)) => positive("sample.width_mm", width, 1e4)?,
-            (Shape::Cylinder, ..) => {
+            (SampleShape::Cylinder, Some(radius), None) => positive("sample.radius_mm", radius, 1e4)?,
+            (SampleShape::Flat, None, Some(width)) => positive("sample.width_mm", width, 1e4)?,
+            (SampleShape::Cylinder, ..) => {
                 return Err("sample: a cylinder needs radius_mm and has no width_mm".to_owned());
             }
-            (Shape::Flat, ..) => {
+            (SampleShape::Flat, ..) => {
                 return Err("sample: a flat sheet needs width_mm and has no radius_mm".to_owned());
             }
         }
@@ -363,7 +363,7 @@ impl Setup {
     /// The setup in a sentence, for provenance.
     pub fn sentence(&self) -> String {
         let sample = match (self.sample.shape, self.sample.radius_mm) {
-            (Shape::Cylinder, Some(radius)) => format!("bent round a cylinder of {radius} mm radius"),
+            (SampleShape::Cylinder, Some(radius)) => format!("bent round a cylinder of {radius} mm radius"),
             _ => "flat".to_owned(),
         };
         let lamps =

@@ -10,9 +10,9 @@ use divan::Bencher;
 use inks::{Curve, Stack};
 use observe::Silent;
 use press::preview::{Light, Probe, STANDARD_LIGHTS, Source, fidelity, flat, sphere};
-use press::sheet::{Area, Sheet};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
+use sheet::{Area, Sheet};
 
 const STACKS: usize = 8;
 

@@ -7,11 +7,12 @@ use divan::{Bencher, black_box};
 use observe::Silent;
 use press::inspect::inspect;
 use press::job::stream::write_job;
-use press::separate::{Pass, Plane};
+use press::separate::Pass;
 use press::simulate::{self, Setup};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 use protocol::rgl::Page;
+use sheet::Plane;
 
 fn main() {
     divan::main();

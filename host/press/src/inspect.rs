@@ -50,11 +50,12 @@ pub fn inspect(stream: &[u8], observer: &dyn Observer) -> Inspected {
 mod tests {
     use super::*;
     use crate::job::stream::write_job;
-    use crate::separate::{Pass, Plane};
+    use crate::separate::Pass;
     use observe::Silent;
     use protocol::ink::Ink;
     use protocol::paper::Paper;
     use protocol::rgl::{Fault, Media, Page};
+    use sheet::Plane;
 
     const PAPER: Paper = Paper::Custom { width: 600, length: 300 };
 

@@ -1,7 +1,7 @@
-//! Dots, pages, jobs and pictures.
+//! Pages, jobs and pictures.
 //!
-//! The modules follow the data. [`halftone`] turns a mixture of stacks into dots, [`layers`] flat art, [`chart`] a chart; each
-//! gives a dot map ([`sheet`]). [`layout`] puts it on a page, [`separate`] splits the page into passes, and [`job`] plans the
+//! The modules follow the data. A dot map ([`sheet`]) comes from a mixture of stacks ([`halftone`]), from flat art or from a
+//! [`chart`]. [`layout`] puts it on a page, [`separate`] splits the page into passes, and [`job`] plans the
 //! passes and writes them in the printer's language. [`simulate`] prints a job without a printer, [`inspect`] reads it, and
 //! [`preview`] shows it. [`pipeline`] is the way from dots to a job. Nothing here talks to a device.
 #![deny(unsafe_code)]
@@ -15,19 +15,12 @@
 )]
 
 pub mod chart;
-pub mod files;
-mod forest;
-pub mod halftone;
 pub mod html;
 pub mod inspect;
 pub mod job;
-pub mod layers;
 pub mod layout;
 pub mod pipeline;
 pub mod preview;
-pub mod process;
-pub mod scratch;
 pub mod separate;
-pub mod sheet;
 pub mod simulate;
 mod split_mix;

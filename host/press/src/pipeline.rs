@@ -21,15 +21,16 @@ use inks::{Certainty, InkSet, Library, Severity};
 use protocol::ink::Kind;
 use protocol::paper::Paper;
 use protocol::rgl::{FoilConsent, Page, Resolution};
+use protocol::walk::Frame;
 
 use crate::job::Handling;
 use crate::job::plan::{Plan, Subject};
 use crate::job::stream::{self, StreamError};
 use crate::layout::{self, Arranged, Laid, Layout, LayoutError};
 use crate::separate::{self, Check, Pass, SeparateError, Separation};
-use crate::sheet::{DotMap, Sheet};
 use crate::simulate::{self, Difference, Printout, PrintoutError, SimulateError};
 use observe::Observer;
+use sheet::{DotMap, Sheet};
 
 /// What is to be printed, and how.
 #[derive(Clone, Copy, Debug)]
@@ -66,6 +67,10 @@ pub struct Draft {
 pub struct Job {
     /// What it prints.
     pub draft: Draft,
+    /// How the printer is told to treat the sheet.
+    pub page: Page,
+    /// Where the dots lie on the page, which is where the walk along which they may have been halftoned begins.
+    pub frame: Frame,
     /// The job in the printer's language.
     pub bytes: Vec<u8>,
 }
@@ -128,7 +133,8 @@ pub fn job(request: &Request<'_>, observer: &dyn Observer) -> Result<Job, JobErr
     let Layout { paper, resolution, .. } = *request.layout;
     let page = Page { resolution, ..request.handling.page(paper) };
     let bytes = encoded(page, passes, &request.allowed, observer)?;
-    Ok(Job { draft, bytes })
+    let frame = layout::frame(request.dots.width(), request.dots.length(), request.layout)?;
+    Ok(Job { draft, page, frame, bytes })
 }
 
 /// What forbids passes at another resolution than 600 dpi: the printer takes the pitch of a dot from the cartridge.
@@ -209,6 +215,11 @@ fn encoded(
 }
 
 impl Job {
+    /// The passes that are printed: those that have a dot.
+    pub fn passes(&self) -> impl Iterator<Item = &Pass> {
+        self.draft.separation.passes.iter().filter(|pass| !pass.plane.is_blank())
+    }
+
     /// Prints the bytes on the simulated printer and compares its sheet with the page, dot for dot. Returns what the
     /// printer made of the bytes, pass by pass.
     ///

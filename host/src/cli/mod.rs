@@ -1,55 +1,28 @@
-//! The command line: one file for each subcommand.
+//! The command line: `commands` has a module for each subcommand, beside it is what they share.
 //!
-//! Arguments are defined here and in the subcommands' files; the stages see only settings. Exit codes: 0 success,
+//! Arguments are defined here and in those modules; the stages see only settings. Exit codes: 0 success,
 //! 1 failure, 2 usage error, 130 interrupted. Results go to standard output, everything else to standard error; a
 //! closed pipe is success.
 
-mod advice;
-mod args;
-mod bridge;
-mod chain;
-mod chart;
-mod choice;
-mod compare;
-mod deliver;
-mod display;
-mod doctor;
-mod edit;
-mod generate;
-mod inks;
-mod inspect;
-mod job;
-mod laid;
-mod layers;
-mod layout;
-mod ledger;
-mod measure;
+mod arguments;
+mod commands;
+mod console;
+mod help;
 mod output;
-mod permission;
-mod plan;
-mod preset;
-mod preview;
-mod print;
-mod progress;
-mod queue;
-mod report;
-mod resume;
-mod sample;
-mod send;
-mod shown;
-mod stdio;
-mod terminal;
+mod printing;
 
 use std::ffi::OsString;
-use std::io::{self, Write as _};
+use std::io::Write as _;
 use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::error::ErrorKind;
-use clap::{CommandFactory as _, Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 
-use progress::Progress;
-use stdio::{chain, closed_pipe, read_job, show};
+use commands::{Command, preset, queue};
+use console::progress::Progress;
+use console::{advice, closed_pipe, permission, say, stderr};
+use observe::visible_line;
 
 /// Print materials instead of colours on the ALPS MD-5500 (Oki DP-5000).
 #[derive(Parser)]
@@ -57,6 +30,11 @@ use stdio::{chain, closed_pipe, read_job, show};
     name = "foilpress",
     version,
     after_help = "Examples:\n  \
+        foilpress print sample:leaf\n  \
+        foilpress layers white.png gold.png black.png --finish artwork\n  \
+        foilpress send job.rgl --to serial:/dev/ttyACM0\n\n\
+        Steps of `print`: factor, map, halftone, layout, separate, encode, simulate",
+    after_long_help = "Examples:\n  \
         foilpress print sample:leaf\n  \
         foilpress print my-material/ --size 120x90mm --bases 8 --to file:job.rgl\n  \
         foilpress layers white.png gold.png black.png --finish artwork\n  \
@@ -68,97 +46,10 @@ use stdio::{chain, closed_pipe, read_job, show};
 )]
 struct Args {
     /// Show no progress on standard error, only notes and errors
-    #[arg(short, long, global = true, display_order = 900)]
+    #[arg(short, long, global = true, display_order = 900, help_heading = help::GENERAL)]
     quiet: bool,
     #[command(subcommand)]
     command: Command,
-}
-
-#[derive(Subcommand)]
-enum Command {
-    /// Print a document of materials
-    ///
-    /// Writes one folder with the job, the plan, the sheet as the simulated printer prints it, and previews. With --to the
-    /// job is also sent to a printer.
-    Print(Box<print::Args>),
-    /// Print spot-colour artwork: a picture for each ink, reserved colours, or named layers
-    ///
-    /// Writes one folder with the job, the plan, the sheet as the simulated printer prints it, and previews. With --to the
-    /// job is also sent to a printer.
-    Layers(Box<layers::Args>),
-    /// Show what a job or a document needs: cartridges, passes, ribbon, time and cautions
-    ///
-    /// Sends nothing, and writes nothing unless --html names a file.
-    Plan(Box<plan::Args>),
-    /// Show a document or a sheet under any light: a page to handle it in a browser, or a picture
-    Preview(Box<preview::Args>),
-    /// Compare photographs of a printed sheet with its prediction: figures, and a page with sliders
-    Compare(Box<compare::Args>),
-    /// Make a display of materials: print a grid of stacks, and write what a screen over it has to show
-    ///
-    /// Writes one folder with the job of the grid, a mask for each image and one to align by, pictures of what is seen, and a
-    /// page that shows it all. With --to the job is also sent to a printer.
-    Display(Box<display::Args>),
-    /// Print a chart: to judge stacks by eye, to measure inks, or to calibrate the printer
-    Chart(Box<chart::Args>),
-    /// Save, list and use named sets of options
-    Preset(preset::Args),
-    /// Show how much ribbon each cartridge has used
-    Ledger(ledger::Args),
-    /// List paper sizes with their printable areas and margins, and how well each is known
-    Papers(layout::PapersArgs),
-    /// Manage printer calibration profiles (offset, feed)
-    Profile(layout::ProfileArgs),
-    /// Factor a document into a few basis materials and their weight maps
-    Factor(chain::Factor),
-    /// Edit the basis materials of a document: rougher, tinted, replaced, swapped, everywhere or under a mask
-    ///
-    /// The document itself stays as it is. The edited document keeps its steps, which can be changed and replayed.
-    Edit(edit::Args),
-    /// Map basis materials (or every pixel) to mixtures of printable stacks
-    Map(chain::Map),
-    /// Choose one stack for every dot of a document
-    Halftone(chain::Halftone),
-    /// Lay dots on a page: position, copies, marks, mirror, profile
-    Layout(chain::Layout),
-    /// Split a page into one-bit passes, one ink each
-    Separate(chain::Separate),
-    /// Encode passes as a job in the printer's language
-    Encode(chain::Encode),
-    /// Print a job on the simulated printer and keep the sheet
-    Simulate(chain::Simulate),
-    /// Describe the contents of a job and report errors with their byte offset
-    Inspect(inspect::Args),
-    /// Send a job to a printer, through a bridge or directly to a device
-    Send(send::Args),
-    /// Resume an interrupted job
-    Resume(resume::Resume),
-    /// Cancel a job and leave the printer ready for the next one
-    Cancel(resume::Cancel),
-    /// List bridges and show their status; flash, test or reset a bridge
-    Bridge(bridge::Args),
-    /// Find out what prevents printing and how to fix it
-    Doctor(doctor::Args),
-    /// Manage ink libraries: list, show, check, compare, share; choose cartridges
-    Inks(inks::Args),
-    /// Measure printed stacks from photographs
-    ///
-    /// Turns series of exposures of a print round a can, with a grey card in the picture, into an ink library with curves,
-    /// their uncertainty and their provenance.
-    Measure(measure::Args),
-    /// Install, remove and list print queues of the system
-    Queue(queue::Args),
-    /// Deliver a job to the printer (called by the print system)
-    #[command(hide = true)]
-    CupsBackend(queue::Conventional),
-    /// Turn pages into jobs (called by the print system)
-    #[command(hide = true)]
-    CupsFilter(queue::Conventional),
-    /// Write the files that a package needs besides the program
-    #[command(hide = true)]
-    Generate(generate::Args),
-    /// List the built-in sample documents or write one as a texture folder
-    Sample(sample::Args),
 }
 
 /// Runs the program with the arguments it was started with.
@@ -166,17 +57,25 @@ pub fn main() -> ExitCode {
     // The renderer of drawings may fail on hostile ones; the reader of art tells that as an error.
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
-        if std::thread::current().name() != Some(press::layers::DRAWING) {
+        if std::thread::current().name() != Some(art::DRAWING) {
             usual(panic);
         }
     }));
-    let args = match preset::expand(std::env::args_os().collect(), &Args::command()) {
-        Ok(args) => match Args::try_parse_from(&args) {
-            Err(error) if error.kind() == ErrorKind::UnknownArgument => {
-                Args::parse_from(negative_values(args))
+    let typed: Vec<OsString> = std::env::args_os().collect();
+    let mut program = program(typed.iter().any(|word| word == "-h"));
+    let args = match preset::expand(typed, &program) {
+        Ok(args) => {
+            let parsed = match parsed(&mut program, args.clone()) {
+                Err(error) if error.kind() == ErrorKind::UnknownArgument => {
+                    parsed(&mut program, negative_values(args))
+                }
+                parsed => parsed,
+            };
+            match parsed {
+                Ok(args) => args,
+                Err(error) => return not_parsed(&error),
             }
-            parsed => parsed.unwrap_or_else(|error| error.exit()),
-        },
+        }
         Err(error) => return failed(&error),
     };
     match &args.command {
@@ -195,18 +94,48 @@ pub fn main() -> ExitCode {
     }
 }
 
+/// The command line; with `short` as `-h` shows it.
+fn program(short: bool) -> clap::Command {
+    help::arranged(Args::command(), short)
+}
+
+/// The arguments as they are meant.
+fn parsed(program: &mut clap::Command, args: Vec<OsString>) -> Result<Args, clap::Error> {
+    let matches = program.try_get_matches_from_mut(args)?;
+    Args::from_arg_matches(&matches).map_err(|error| error.format(program))
+}
+
+/// Says what is wrong with the arguments, or shows the help that was asked for.
+fn not_parsed(error: &clap::Error) -> ExitCode {
+    let acts = |argument: OsString| {
+        let text = argument.to_string_lossy().into_owned();
+        visible_line(&text) != text
+    };
+    // Clap quotes arguments as they are; only without its colours can they be told from its own text. A closed pipe is
+    // success.
+    let _ = match std::env::args_os().any(acts) {
+        true => write!(stderr(), "{}", error.render()),
+        false => error.print(),
+    };
+    ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(USAGE))
+}
+
+/// Exit code for wrong arguments.
+const USAGE: u8 = 2;
+
 /// Says why the program fails.
 fn failed(error: &anyhow::Error) -> ExitCode {
-    const USAGE: u8 = 2;
     if let Some(usage) = error.downcast_ref::<clap::Error>() {
         // Standard error is all there is to say it on.
         let _ = usage.print();
         return ExitCode::from(USAGE);
     }
-    let advice = advice::of(error).map_or_else(String::new, |advice| format!("; {advice}"));
-    let _ = writeln!(io::stderr(), "foilpress: {}{advice}", chain(error));
+    let (text, hints) = advice::explained(error);
+    say(&format!("foilpress: {text}"));
+    hints.iter().for_each(|hint| say(&format!("  hint: {hint}")));
     if permission::is_missing(error) {
-        let _ = write!(io::stderr(), "\n{}", permission::how_to_give());
+        say("");
+        permission::how_to_give().lines().for_each(say);
     }
     ExitCode::FAILURE
 }
@@ -234,38 +163,5 @@ fn negative_values(args: Vec<OsString>) -> Vec<OsString> {
 
 fn run(args: Args) -> Result<()> {
     let observer = &Progress::new(args.quiet);
-    match args.command {
-        Command::Print(args) => print::run(&args, observer),
-        Command::Layers(args) => layers::run(&args, observer),
-        Command::Plan(args) => plan::run(&args, observer),
-        Command::Preview(args) => preview::run(&args, observer),
-        Command::Compare(args) => compare::run(&args, observer),
-        Command::Display(args) => display::run(&args, observer),
-        Command::Chart(args) => chart::run(&args, observer),
-        Command::Preset(args) => preset::run(&args, &Args::command()),
-        Command::Ledger(args) => ledger::run(&args),
-        Command::Papers(args) => layout::papers(&args),
-        Command::Profile(args) => layout::profile_command(&args),
-        Command::Factor(args) => args.run(observer),
-        Command::Edit(args) => edit::run(&args, observer),
-        Command::Map(args) => args.run(observer),
-        Command::Halftone(args) => args.run(observer),
-        Command::Layout(args) => args.run(observer),
-        Command::Separate(args) => args.run(observer),
-        Command::Encode(args) => args.run(observer),
-        Command::Simulate(args) => args.run(observer),
-        Command::Inspect(args) => inspect::run(&args, observer),
-        Command::Send(args) => send::run(&args, observer),
-        Command::Resume(args) => resume::resume(&args, observer),
-        Command::Cancel(args) => resume::cancel(&args, observer),
-        Command::Bridge(args) => bridge::run(&args, observer),
-        Command::Doctor(args) => doctor::run(&args),
-        Command::Inks(args) => inks::run(args, observer),
-        Command::Measure(args) => measure::run(&args, observer),
-        Command::Generate(args) => generate::run(&args, &Args::command()),
-        Command::Queue(args) => queue::run(&args, observer),
-        Command::Sample(args) => sample::run(args),
-        // `main` has run these already.
-        Command::CupsBackend(_) | Command::CupsFilter(_) => Ok(()),
-    }
+    args.command.run(&program(false), observer)
 }

@@ -1,19 +1,22 @@
 //! Outputs appear whole or not at all.
 //!
-//! Everything is written to a hidden staging folder beside its destination and moved there at the end. The folder is removed
-//! when the program fails, and by [`remove_on_interrupt`] when it is stopped. A folder is replaced only by a folder of the same
-//! [`Kind`] and if this program wrote all of it, a file only by a file in the same format.
+//! Everything is written to a hidden staging folder beside its destination and moved there at the end,
+//! [durably](durable::place). The staging folder is removed when the program fails, and by [`remove_on_interrupt`] when it is
+//! stopped. A folder is replaced only by a folder of the same [`Kind`] and if this program wrote all of it, a file only by a
+//! file in the same format.
 
 use std::fs;
-use std::io::{self, Read as _, Write as _};
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use crate::cli::console::say;
 use anyhow::{Context, Result, bail};
 use appearance::edit;
-use press::process;
-use press::scratch::{self, Scratch};
-use press::separate::files;
+use art::process;
+use files::durable;
+use files::scratch::{self, Scratch};
+use press::separate::files::is_signed;
 use protocol::ink::Ink;
 
 /// What the user is told when the program is interrupted.
@@ -59,7 +62,7 @@ impl Kind {
             Kind::Dots => Some("dots.toml"),
             Kind::Sheet => Some("sheet.toml"),
             Kind::Passes => Some("passes.toml"),
-            Kind::Measured => Some(measure::library::FIGURES),
+            Kind::Measured => Some(measure::curves::library::FIGURES),
             Kind::Predicted => Some(inks::archive::PREDICTION),
             Kind::Pictures | Kind::Maps => None,
         }
@@ -114,9 +117,8 @@ impl Kind {
             let known = name.to_str().is_some_and(|name| self.writes(name));
             let passes = self == Kind::Print && name == "passes";
             // Without a description beside them, pictures of passes are told from art by what is written in them.
-            let signed = self != Kind::Pictures
-                || !is_pass(&name.to_string_lossy())
-                || files::is_signed(&entry.path());
+            let signed =
+                self != Kind::Pictures || !is_pass(&name.to_string_lossy()) || is_signed(&entry.path());
             if !known || !signed || entry.file_type()?.is_dir() != passes {
                 return Ok(Some(entry.path()));
             }
@@ -258,16 +260,10 @@ impl Staged {
         }
         // Held to the end, so that an interruption waits until the new output has replaced the old.
         let mut folders = scratch::folders();
-        let mut old = self.inside.clone().into_os_string();
-        old.push(".replaced");
-        let old = PathBuf::from(old);
-        if self.target.is_dir() {
-            fs::rename(&self.target, &old)
-                .with_context(|| format!("cannot replace {}", self.target.display()))?;
-        }
-        if let Err(error) = fs::rename(&self.inside, &self.target) {
-            // The old folder goes back; if even that fails it is still in the staging folder, which stays.
-            if old.exists() && fs::rename(&old, &self.target).is_err() {
+        let was_there = self.target.exists();
+        if let Err(error) = durable::place(&self.inside, &self.target) {
+            // An old folder that was put aside and does not go back is in the staging folder, which stays.
+            if was_there && !self.target.exists() {
                 let kept = self.folder.keep(&mut folders);
                 bail!(
                     "cannot write {}: {error}; the previous contents are in {}",
@@ -328,7 +324,8 @@ pub fn remove_on_interrupt() -> Result<()> {
         }
         let farewell = FAREWELL.lock().unwrap_or_else(PoisonError::into_inner);
         let text = farewell.as_deref().unwrap_or("nothing unfinished is left behind");
-        let _ = writeln!(io::stderr(), "\nfoilpress: interrupted; {text}");
+        say("");
+        say(&format!("foilpress: interrupted; {text}"));
         std::process::exit(130);
     })
     .context("cannot watch for Ctrl-C")
@@ -409,10 +406,15 @@ mod tests {
     fn pictures_of_passes_do_not_take_the_place_of_art() {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("art");
-        let plane = press::separate::Plane { width: 8, length: 8, stride: 1, bits: vec![0; 8] };
+        let plane = sheet::Plane { width: 8, length: 8, stride: 1, bits: vec![0; 8] };
         for _ in 0..2 {
             let staged = Staged::folder(&target, Kind::Pictures).unwrap();
-            files::save_plane(&plane, (600, 600), &staged.create().unwrap().join("01-white.png")).unwrap();
+            press::separate::files::save_plane(
+                &plane,
+                (600, 600),
+                &staged.create().unwrap().join("01-white.png"),
+            )
+            .unwrap();
             staged.commit().unwrap();
         }
         image::GrayImage::new(8, 8).save(target.join("02-gold.png")).unwrap();

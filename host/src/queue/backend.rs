@@ -23,14 +23,16 @@ use std::time::Duration;
 use super::call::{Call, Exit};
 use super::messages::Messages;
 use super::uri;
+use art::process::Process;
+use device::connection::{Address, Destination};
 use device::deliver::{Delivery, Ended, Failure, Job, Packed};
+use device::forms::{self, Checked, Content};
 use device::printers::{Printer, Printers};
-use device::send::journal::{Entry, Journal, OpenJob};
-use device::send::session::{Outcome, Phase, SessionError};
-use device::send::{self, Address, Checked, Destination};
+use device::transit::journal::{Entry, Journal, OpenJob};
+use device::transit::raw::RawError;
+use device::transit::session::{Outcome, Phase, SessionError};
 use observe::Silent;
 use press::inspect::sheets;
-use press::process::Process;
 use system::System;
 
 /// The most bytes of a job: dozens of pages.
@@ -89,7 +91,7 @@ impl<W: Write + Send> Backend<'_, W> {
         let checked: Vec<Checked> = (1..)
             .zip(&places)
             .map(|(number, place)| {
-                send::check(&job[place.clone()], &Silent).map_err(|error| {
+                forms::check(&job[place.clone()], &Silent).map_err(|error| {
                     self.fail(
                         Exit::Cancel,
                         &format!("sheet {number} of {}: {}", places.len(), observe::with_causes(&error)),
@@ -153,7 +155,8 @@ impl<W: Write + Send> Backend<'_, W> {
         checked: &Checked,
         folder: &Path,
     ) -> Result<bool, Stopped> {
-        let job = Job { name: &self.call.title, bytes: &job[place.clone()], checked };
+        let content = Content::Bytes(&job[place.clone()]);
+        let job = Job { name: &self.call.title, content, checked };
         // Whoever releases a job that was held agrees to what it was held for.
         self.system.released(fs::remove_file(folder.join(HELD)).is_ok());
         match &self.call.to {
@@ -244,7 +247,7 @@ impl<W: Write + Send> Backend<'_, W> {
                 let what = if matches!(owed.printer, Printer::Device(_)) { SWITCH } else { RESET };
                 self.hold(folder, &text, what)
             }
-            Failure::Raw(send::raw::RawError::Write { .. }) => self.hold(folder, &text, SWITCH),
+            Failure::Raw(RawError::Write { .. }) => self.hold(folder, &text, SWITCH),
             Failure::NotAlps(_) => self.fail(
                 Exit::Stop,
                 &format!("not sent: {text}. Connect the right one, then start the queue again (cupsenable)"),
@@ -370,10 +373,11 @@ mod tests {
     use super::*;
     use press::inspect::inspect;
     use press::job::stream::write_job;
-    use press::separate::{Pass, Plane};
+    use press::separate::Pass;
     use protocol::ink::Ink;
     use protocol::paper::Paper;
     use protocol::rgl::Page;
+    use sheet::Plane;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     fn job(ink: Ink, rows: usize) -> Vec<u8> {

@@ -6,8 +6,8 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use super::{options, uri};
-use device::send::Destination;
-use device::send::journal::{Journal, JournalError};
+use device::connection::Destination;
+use device::transit::journal::{Journal, JournalError};
 
 /// What the print system should do next. The numbers are defined by CUPS.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

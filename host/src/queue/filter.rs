@@ -6,7 +6,7 @@
 //! else is halftoned in process inks. A page with spot colours that name inks is separated, too, and the plates of these are
 //! layers. The art is laid where the page has it, or where the user wants it, on a sheet of the page's size; what lies on the
 //! margins is reported in millimetres.
-//! Cost: the page at a bit or four bytes a pixel, and what [`layers`] costs; for documents that may have spot colours, one
+//! Cost: the page at a bit or four bytes a pixel, and what [`art`] costs; for documents that may have spot colours, one
 //! more drawing of all pages at a low resolution; for those that may have gradients that Ghostscript leaves out, a run
 //! without output.
 //! Limits: documents of 1 GB and 1000 pages, sheets the printer takes, upright. Transparency is gone when a page has been
@@ -27,13 +27,13 @@ use tempfile::NamedTempFile;
 
 use super::options::{Choices, NoChoice, Spots};
 use super::raster::{self, RasterError};
+use art::Page;
+use art::pdf::{Interpreter, Survey};
+use art::process::MOST_PAGES;
 use drawing::Drawing;
-use observe::Observer;
+use observe::{Diagnosis, Fault, Observer};
 use page::Press;
-use press::layers::pdf::{Interpreter, Survey};
-use press::layers::{self, LayersError, Page};
 use press::pipeline::JobError;
-use press::process::MOST_PAGES;
 
 /// The largest document.
 const LARGEST: u64 = 1 << 30;
@@ -105,19 +105,19 @@ pub enum FilterError {
     TooManyPages,
     /// The plates of a document.
     #[error("cannot read the document's spot colours")]
-    Plates(#[source] LayersError),
+    Plates(#[source] Diagnosis),
     /// A spot colour of which it is not clear whether it names an ink.
     #[error(
         "a spot colour of the document may be meant as an ink; FoilpressSpots=Off prints it in process inks"
     )]
-    Spot(#[source] LayersError),
+    Spot(#[source] Diagnosis),
     /// The art.
     #[error("page {page} cannot be printed")]
     Layers {
         /// Page, from 1.
         page: usize,
         /// What is the matter.
-        source: LayersError,
+        source: Diagnosis,
     },
     /// A page with more inks than the printer holds.
     #[error(
@@ -217,25 +217,25 @@ fn pictures(document: impl Read, press: &mut Press<'_>) -> Result<(), FilterErro
 /// The pages of a PDF or PostScript file.
 fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
     let dpi = press.choices.dpi;
-    if let Some(doubt) = layers::pdf::cut_short(path) {
+    if let Some(doubt) = art::pdf::cut_short(path) {
         press.observer.note(&doubt);
     }
     let suspected = Suspected::of(path)?;
     let whole = |interpreter| Survey { spots: Vec::new(), interpreter };
     let Survey { spots, interpreter } = match press.choices.spots {
-        Spots::None if suspected.gradients => whole(layers::pdf::interpreter(path)),
+        Spots::None if suspected.gradients => whole(art::pdf::interpreter(path)),
         Spots::None => whole(Interpreter::Usual),
         _ if suspected.spots => {
-            layers::pdf::survey(path, press.observer).map_err(|error| match of_document(error) {
-                error @ LayersError::UnknownInk { .. } => FilterError::Spot(error),
+            art::pdf::survey(path, press.observer).map_err(|error| match of_document(error) {
+                error if error.fault() == Fault::Name => FilterError::Spot(error),
                 error => FilterError::Plates(error),
             })?
         }
-        _ if suspected.gradients => whole(layers::pdf::interpreter(path)),
+        _ if suspected.gradients => whole(art::pdf::interpreter(path)),
         _ => whole(Interpreter::Usual),
     };
     if interpreter == Interpreter::Older {
-        press.observer.note(layers::pdf::OLDER);
+        press.observer.note(art::pdf::OLDER);
     }
     if spots.iter().all(Vec::is_empty) {
         return drawn((path, interpreter), None, press);
@@ -247,7 +247,7 @@ fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
         }
         press.observer.note(&format!("page {number}: {} printed as inks", plates.join(", ")));
         let in_page = |error| FilterError::Layers { page: number, source: of_document(error) };
-        let page = layers::pdf::separated(path, interpreter, number, dpi.into()).map_err(in_page)?;
+        let page = art::pdf::separated(path, interpreter, number, dpi.into()).map_err(in_page)?;
         let paper = page::paper(number, page.size, dpi, press.choices)?;
         if let Some(view) = press.view(number, paper, (page.size, dpi), page.bounds(), false) {
             let art =
@@ -260,14 +260,8 @@ fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
 }
 
 /// An error without the name of the file where the document is kept, which its owner never sees.
-fn of_document(mut error: LayersError) -> LayersError {
-    if let LayersError::Io { path, .. }
-    | LayersError::File { path, .. }
-    | LayersError::UnknownInk { path, .. } = &mut error
-    {
-        *path = "this document".into();
-    }
-    error
+fn of_document(error: Diagnosis) -> Diagnosis {
+    error.calling_it("this document")
 }
 
 /// Refuses a document that shows pages for ever.
@@ -295,9 +289,9 @@ fn drawn(
     let said = drawing.end()?;
     if number == first {
         let page = only.and_then(|page| u32::try_from(page).ok());
-        return Err(FilterError::NoPage(layers::pdf::no_page(&said, page)));
+        return Err(FilterError::NoPage(art::pdf::no_page(&said, page)));
     }
-    if let Some(damage) = layers::pdf::damaged(&said) {
+    if let Some(damage) = art::pdf::damaged(&said) {
         press.observer.note(&damage);
     }
     Ok(())
@@ -326,7 +320,7 @@ fn picture(
 struct Suspected {
     /// Spot colours; also if it is a program.
     spots: bool,
-    /// Gradients that not every interpreter draws ([`layers::pdf::interpreter`]).
+    /// Gradients that not every interpreter draws ([`art::pdf::interpreter`]).
     gradients: bool,
 }
 

@@ -10,6 +10,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::ppd;
+use files::durable::{self, Access};
 use press::layout::Profile;
 
 /// Where a print system keeps its things.
@@ -112,35 +113,16 @@ pub fn put(wanted: &Wanted) -> io::Result<bool> {
     if fs::read_to_string(&wanted.path).is_ok_and(|text| text == wanted.text) {
         return Ok(false);
     }
-    let folder = wanted.path.parent().unwrap_or(Path::new("/"));
-    fs::create_dir_all(folder)?;
-    let staged = tempfile::NamedTempFile::new_in(folder)?;
-    fs::write(staged.path(), &wanted.text)?;
-    set_mode(staged.path(), wanted.executable)?;
-    staged.persist(&wanted.path).map_err(|error| error.error)?;
+    durable::make_folder(wanted.path.parent().unwrap_or(Path::new("/")))?;
+    let access = if wanted.executable { Access::Program } else { Access::Everyone };
+    durable::write(&wanted.path, wanted.text.as_bytes(), access)?;
     Ok(true)
 }
 
 /// Copies the program to a folder that only root can change.
 pub fn copy_program(from: &Path, to: &Path) -> io::Result<()> {
-    let folder = to.parent().unwrap_or(Path::new("/"));
-    fs::create_dir_all(folder)?;
-    let staged = tempfile::NamedTempFile::new_in(folder)?;
-    fs::copy(from, staged.path())?;
-    set_mode(staged.path(), true)?;
-    staged.persist(to).map_err(|error| error.error)?;
-    Ok(())
-}
-
-#[cfg(unix)]
-fn set_mode(path: &Path, executable: bool) -> io::Result<()> {
-    use std::os::unix::fs::PermissionsExt as _;
-    fs::set_permissions(path, fs::Permissions::from_mode(if executable { 0o755 } else { 0o644 }))
-}
-
-#[cfg(not(unix))]
-fn set_mode(_path: &Path, _executable: bool) -> io::Result<()> {
-    Ok(())
+    durable::make_folder(to.parent().unwrap_or(Path::new("/")))?;
+    durable::write(to, &fs::read(from)?, Access::Program)
 }
 
 #[cfg(all(test, unix))]

@@ -6,8 +6,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::uri;
-use device::send::find;
-use device::send::query::is_alps;
+use device::connection::find;
+use device::questions::query::is_alps;
 
 /// The line that is printed when there is no device, so that the print system knows the backend.
 const NO_DEVICE: &str = "network foilpress \"Unknown\" \"ALPS MD-5500 through a Foilpress bridge\"";

@@ -12,8 +12,8 @@ use protocol::ink::Ink;
 use protocol::link::message::Fault;
 use protocol::status::Complaint;
 
-use device::send::status::Status;
-use observe::Observer;
+use device::questions::status::Status;
+use observe::{Observer, visible_line};
 
 /// Why a printer does not print, or soon will not.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -124,7 +124,8 @@ impl<W: Write> Messages<W> {
 
     fn line(&self, keyword: &str, text: &str) {
         // A message is one line. If nobody reads it, the job goes on.
-        let text: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+        let text = text.replace('\n', " ");
+        let text = visible_line(&text);
         // Filter and backend share a pipe: what is written at once, up to a page, is not torn apart by the other's lines.
         let line = format!("{keyword}: {text}\n");
         self.with(|state| {
@@ -190,7 +191,7 @@ impl<W: Write> Messages<W> {
         if status.stale || status.cartridges.is_empty() {
             return;
         }
-        let each = |say: &dyn Fn(&device::send::status::CartridgeStatus) -> String| {
+        let each = |say: &dyn Fn(&device::questions::status::CartridgeStatus) -> String| {
             status.cartridges.iter().map(say).collect::<Vec<_>>().join(",")
         };
         // Of IPP's levels: -3 some is left, 0 none.
@@ -286,7 +287,7 @@ mod tests {
     fn a_text_from_anywhere_is_one_line() {
         let messages = Messages::of_filter(Vec::new());
         messages.info("two\nlines\u{1b}[31m\rSTATE: +paused");
-        assert_eq!(said(messages), ["INFO: two lines [31m STATE: +paused"]);
+        assert_eq!(said(messages), ["INFO: two lines\\u001b[31m\\u000dSTATE: +paused"]);
     }
 
     /// Two processes write to one pipe, so a line in parts would be torn apart.

@@ -7,8 +7,8 @@ use inks::InkSet;
 use protocol::ink::Ink;
 use protocol::rgl::Media;
 
-use press::halftone::Method;
-use press::layers::{Finish, GAMMAS, Intent, White};
+use art::{Finish, GAMMAS, Intent, White};
+use halftone::Method;
 use press::layout::{Point, Profile};
 
 /// Keywords for the calibration profile of the queue's printer in its description.

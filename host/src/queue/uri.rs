@@ -6,7 +6,7 @@
 
 use percent_encoding::{AsciiSet, CONTROLS, percent_decode_str, utf8_percent_encode};
 
-use device::send::{Destination, NoDestination};
+use device::connection::{Destination, NoDestination};
 
 /// The scheme, and the name of the backend.
 pub const SCHEME: &str = "foilpress";

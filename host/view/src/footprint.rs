@@ -274,7 +274,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(100))]
+        #![proptest_config(testing::cases(100))]
 
         #[test]
         fn weights_are_the_formula_of_williams(

@@ -200,7 +200,7 @@ mod tests {
     /// Dots that are looked at one by one lose together what their mean loses.
     #[test]
     fn single_dots_darken_as_their_mean() {
-        use press::sheet::{Area, DotMap};
+        use sheet::{Area, DotMap};
         let space = Space::half_angle(64);
         let mut stacks = Table::new(space.columns());
         for body in BODIES {

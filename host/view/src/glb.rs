@@ -9,12 +9,10 @@
 //! texels are from the curves they stand for.
 //! Source: glTF 2.0, sections 3.6, 3.7, 3.9 and 4.4.
 
-use std::io::Cursor;
-
 use appearance::brdf::Space;
 use appearance::materials::{Metallic, Widths};
 use appearance::srgb;
-use image::{DynamicImage, ImageFormat, RgbImage};
+use image::ExtendedColorType;
 use observe::Observer;
 use rayon::prelude::*;
 use serde_json::json;
@@ -76,13 +74,11 @@ pub fn glb(lit: &Lit, space: &Space, name: &str, observer: &dyn Observer) -> Res
     let square: f64 = texels.iter().map(|texel| texel.distance.powi(2)).sum();
     let worst = texels.iter().map(|texel| texel.distance).fold(0.0, f64::max);
     let texture = |texel: fn(&Texel) -> [u8; 3]| {
-        let bytes = texels.iter().flat_map(texel).collect();
-        let picture = RgbImage::from_raw(level.width as u32, level.height as u32, bytes);
-        let mut png = Cursor::new(Vec::new());
-        DynamicImage::from(picture.unwrap_or_default())
-            .write_to(&mut png, ImageFormat::Png)
-            .map_err(std::io::Error::other)?;
-        Ok::<_, ViewError>(png.into_inner())
+        let bytes: Vec<u8> = texels.iter().flat_map(texel).collect();
+        let size = (level.width as u32, level.height as u32);
+        Ok::<_, ViewError>(
+            pictures::png(&bytes, size, ExtendedColorType::Rgb8).map_err(std::io::Error::other)?,
+        )
     };
     // Red is free; occlusion, which some programs expect there, is none.
     let surfaces = texture(|texel| [255, texel.roughness, texel.metallic])?;

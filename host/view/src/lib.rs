@@ -18,7 +18,7 @@
 
 pub mod display;
 mod error;
-mod eye;
+
 mod footprint;
 mod gain;
 mod glb;
@@ -29,11 +29,12 @@ mod ray;
 mod render;
 mod scene;
 mod surroundings;
+mod viewing_distance;
 
 pub use error::ViewError;
-pub use eye::finer;
 pub use gain::{DOT_GAIN, places_for_dot_gain};
 pub use glb::{Glb, glb};
 pub use lit::{Lit, fit, mapped};
 pub use render::Renderer;
 pub use scene::{Camera, Light, Pose, Scene, direction, proportions};
+pub use viewing_distance::finer;

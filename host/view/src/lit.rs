@@ -14,8 +14,8 @@ use appearance::gamut::InkMix;
 use appearance::weights::ONE;
 use inks::{Curve, Library};
 use press::preview::Source;
-use press::sheet::{Area, DotMap};
 use rayon::prelude::*;
+use sheet::{Area, DotMap};
 
 use crate::error::ViewError;
 

@@ -25,10 +25,10 @@ use observe::Observer;
 use press::html;
 use press::preview::{Probe, Source, ToneCurve};
 use press::separate;
-use press::sheet::{Area, DotMap, colours, label};
 use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::json;
+use sheet::{Area, DotMap, colours, label};
 
 use crate::error::ViewError;
 use crate::gain::body;

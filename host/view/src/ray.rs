@@ -340,7 +340,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(60))]
+        #![proptest_config(testing::cases(60))]
 
         #[test]
         fn rays_meet_the_sheet_where_bisection_finds_it(

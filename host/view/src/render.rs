@@ -29,7 +29,7 @@ pub struct Renderer<'a> {
 }
 
 /// A scene in the axes of the sheet.
-struct Seen {
+struct SheetScene {
     rays: Rays,
     lamps: Vec<Lamp>,
     field: Option<Field>,
@@ -113,10 +113,10 @@ impl<'a> Renderer<'a> {
     }
 
     /// Brings a scene into the axes of the sheet.
-    fn seen(&self, scene: &Scene, width: usize, height: usize, observer: &dyn Observer) -> Seen {
+    fn seen(&self, scene: &Scene, width: usize, height: usize, observer: &dyn Observer) -> SheetScene {
         let frame = Frame::new(&scene.pose);
         let places = [self.lit.levels[0].width, self.lit.levels[0].height];
-        Seen {
+        SheetScene {
             rays: Rays::new(scene, self.lit.size, places, width, height),
             lamps: scene.lights.iter().map(|light| Lamp::new(light, &frame)).collect(),
             field: scene
@@ -128,7 +128,7 @@ impl<'a> Renderer<'a> {
 
     /// Renders a row, which is black and empty.
     #[inline(always)]
-    fn row(&self, seen: &Seen, y: usize, row: &mut [[f32; 4]], block: &mut Block) {
+    fn row(&self, seen: &SheetScene, y: usize, row: &mut [[f32; 4]], block: &mut Block) {
         let Block { hits, weights, lighting, sums } = block;
         for (n, out) in row.chunks_mut(BLOCK).enumerate() {
             seen.rays.follow(n * BLOCK, y, hits);
@@ -348,7 +348,7 @@ mod tests {
     /// Dots of three stacks, a flat grey each, without order, and what is lit with maps of `places`.
     fn print(side: usize, places: usize) -> (Vec<u8>, Lit) {
         use appearance::brdf::{Space, Table};
-        use press::sheet::{Area, DotMap};
+        use sheet::{Area, DotMap};
         let space = Space::half_angle(16);
         let mut stacks = Table::new(space.columns());
         [0.2, 0.05, 0.01].iter().for_each(|grey| stacks.push(&vec![*grey; space.columns()]));

@@ -58,7 +58,7 @@ pub(super) enum Slot {
 }
 
 /// Where a number is kept.
-enum Place<'a> {
+enum FigureTarget<'a> {
     Scalar(&'a mut Figure<f64>),
     Channel(&'a mut Figure<[f64; 3]>, usize),
     /// A channel of a colour that is kept as CIELAB.
@@ -145,37 +145,37 @@ impl Slot {
         }
     }
 
-    fn place(self, optics: &mut Optics) -> Option<Place<'_>> {
+    fn place(self, optics: &mut Optics) -> Option<FigureTarget<'_>> {
         let Optics { paper, model, layers } = optics;
         Some(match self {
-            Slot::Paper(c) => Place::Colour(&mut paper.lab, c),
-            Slot::PaperF0 => Place::Scalar(&mut paper.f0),
-            Slot::PaperAlpha => Place::Scalar(&mut paper.alpha),
-            Slot::InkOnMetalF0 => Place::Scalar(&mut model.ink_on_metal_f0),
-            Slot::InkOnMetalWidening => Place::Scalar(&mut model.ink_on_metal_widening),
-            Slot::InkOnMetalAlpha => Place::Scalar(&mut model.ink_on_metal_alpha),
-            Slot::CoatInternal => Place::Scalar(&mut model.coat_internal),
-            Slot::CoatWidening => Place::Scalar(&mut model.coat_widening),
+            Slot::Paper(c) => FigureTarget::Colour(&mut paper.lab, c),
+            Slot::PaperF0 => FigureTarget::Scalar(&mut paper.f0),
+            Slot::PaperAlpha => FigureTarget::Scalar(&mut paper.alpha),
+            Slot::InkOnMetalF0 => FigureTarget::Scalar(&mut model.ink_on_metal_f0),
+            Slot::InkOnMetalWidening => FigureTarget::Scalar(&mut model.ink_on_metal_widening),
+            Slot::InkOnMetalAlpha => FigureTarget::Scalar(&mut model.ink_on_metal_alpha),
+            Slot::CoatInternal => FigureTarget::Scalar(&mut model.coat_internal),
+            Slot::CoatWidening => FigureTarget::Scalar(&mut model.coat_widening),
             Slot::Solid(ink, c) => match layer(layers, ink)? {
-                Layer::Filter(filter) => Place::Colour(&mut filter.lab, c),
+                Layer::Filter(filter) => FigureTarget::Colour(&mut filter.lab, c),
                 _ => return None,
             },
             Slot::FilterF0(ink) | Slot::FilterAlpha(ink) => match layer(layers, ink)? {
-                Layer::Filter(filter) => Place::Scalar(match self {
+                Layer::Filter(filter) => FigureTarget::Scalar(match self {
                     Slot::FilterF0(_) => &mut filter.f0,
                     _ => &mut filter.alpha,
                 }),
                 _ => return None,
             },
             Slot::Transmission(ink) | Slot::Levelling(ink) => match layer(layers, ink)? {
-                Layer::Undercoat(under) => Place::Scalar(match self {
+                Layer::Undercoat(under) => FigureTarget::Scalar(match self {
                     Slot::Transmission(_) => &mut under.transmission,
                     _ => &mut under.levelling,
                 }),
                 _ => return None,
             },
             Slot::CoatF0(ink) | Slot::CoatAlpha(ink) => match layer(layers, ink)? {
-                Layer::Coat(coat) => Place::Scalar(match self {
+                Layer::Coat(coat) => FigureTarget::Scalar(match self {
                     Slot::CoatF0(_) => &mut coat.f0,
                     _ => &mut coat.alpha,
                 }),
@@ -190,13 +190,13 @@ impl Slot {
             | Slot::BinderAlpha(ink) => {
                 let Layer::Metal(metal) = layer(layers, ink)? else { return None };
                 match self {
-                    Slot::Diffuse(_, c) => Place::Channel(metal.diffuse_tint.as_mut()?, c),
-                    Slot::Reflectance(_, c) => Place::Channel(metal.tint.as_mut()?, c),
-                    Slot::SeenPower(_) => Place::Scalar(metal.seen_power.as_mut()?),
-                    Slot::MetalAlpha(_) => Place::Scalar(&mut metal.alpha),
-                    Slot::AlphaOnPrimer(_) => Place::Scalar(&mut metal.alpha_on_primer),
-                    Slot::BinderF0(_) => Place::Scalar(metal.binder_f0.as_mut()?),
-                    _ => Place::Scalar(metal.binder_alpha.as_mut()?),
+                    Slot::Diffuse(_, c) => FigureTarget::Channel(metal.diffuse_tint.as_mut()?, c),
+                    Slot::Reflectance(_, c) => FigureTarget::Channel(metal.tint.as_mut()?, c),
+                    Slot::SeenPower(_) => FigureTarget::Scalar(metal.seen_power.as_mut()?),
+                    Slot::MetalAlpha(_) => FigureTarget::Scalar(&mut metal.alpha),
+                    Slot::AlphaOnPrimer(_) => FigureTarget::Scalar(&mut metal.alpha_on_primer),
+                    Slot::BinderF0(_) => FigureTarget::Scalar(metal.binder_f0.as_mut()?),
+                    _ => FigureTarget::Scalar(metal.binder_alpha.as_mut()?),
                 }
             }
         })
@@ -205,22 +205,22 @@ impl Slot {
     /// The number; `None` if the optics have no such figure.
     pub fn get(self, optics: &mut Optics) -> Option<f64> {
         Some(match self.place(optics)? {
-            Place::Scalar(figure) => figure.get(),
-            Place::Channel(figure, c) => figure.get()[c],
-            Place::Colour(figure, c) => lab::to_linear_rgb(figure.get())[c],
+            FigureTarget::Scalar(figure) => figure.get(),
+            FigureTarget::Channel(figure, c) => figure.get()[c],
+            FigureTarget::Colour(figure, c) => lab::to_linear_rgb(figure.get())[c],
         })
     }
 
     /// Changes the number, if the optics have it.
     pub fn set(self, optics: &mut Optics, value: f64) {
         match self.place(optics) {
-            Some(Place::Scalar(figure)) => figure.set(value),
-            Some(Place::Channel(figure, c)) => {
+            Some(FigureTarget::Scalar(figure)) => figure.set(value),
+            Some(FigureTarget::Channel(figure, c)) => {
                 let mut triple = figure.get();
                 triple[c] = value;
                 figure.set(triple);
             }
-            Some(Place::Colour(figure, c)) => {
+            Some(FigureTarget::Colour(figure, c)) => {
                 let mut rgb = lab::to_linear_rgb(figure.get());
                 rgb[c] = value;
                 figure.set(lab::from_linear_rgb(rgb));

@@ -7,7 +7,7 @@
 //! Cost: n^3 / 6 operations a step beside the caller's. Limits: a local minimum near the start. Priors of the caller keep the equations
 //! regular.
 
-use crate::linear::Cholesky;
+use crate::linalg::Cholesky;
 
 /// A symmetric matrix, row by row.
 #[derive(Clone, Debug, PartialEq)]

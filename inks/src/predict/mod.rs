@@ -22,7 +22,7 @@ use self::figures::Slot;
 use self::least_squares::{Matrix, Normal};
 use crate::curve::Curve;
 use crate::library::Library;
-use crate::linear::Cholesky;
+use crate::linalg::Cholesky;
 use crate::model::{ModelError, Optics};
 use crate::stack::Stack;
 use crate::uncertainty::SampleKind;
@@ -311,7 +311,7 @@ struct Misfit {
 
 impl Misfit {
     /// The misfit that stacks which were left out show.
-    fn of(stacks: &[Vec<Excess>]) -> Misfit {
+    fn of_stacks(stacks: &[Vec<Excess>]) -> Misfit {
         if stacks.is_empty() {
             return Misfit { even: UNTESTED * UNTESTED, filtering: 0.0 };
         }
@@ -388,7 +388,7 @@ impl Library {
         let errors: Vec<f64> = left.iter().filter_map(|l| l.left_out).collect();
         let mean = |of: &[f64]| (of.iter().map(|e| e * e).sum::<f64>() / of.len() as f64).sqrt();
         let error = (!errors.is_empty()).then(|| mean(&errors));
-        let misfit = Misfit::of(&excess);
+        let misfit = Misfit::of_stacks(&excess);
         let modelled = self.entries().iter().filter(|entry| entry.lobes.is_some());
         let (known, unknown): (Vec<_>, Vec<_>) = modelled.partition(|e| is_known(from, &e.stack, &all));
         let stacks = known

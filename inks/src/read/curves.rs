@@ -4,20 +4,28 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use super::{Listing, MOST_CURVE_BYTES, parse_stack, provenance, text};
+use super::fields::{MOST_CURVE_BYTES, parse_stack, provenance, text};
 use crate::curve::{Curve, CurveError};
 use crate::format::MeasuredTable;
 use crate::problem::{Findings, Problem};
 use crate::provenance::Provenance;
 use crate::rule::Severity;
+use crate::stack::Stack;
 use crate::uncertainty::Uncertainty;
 
 /// A measured or predicted curve as it was read.
-pub(super) struct Measured {
+pub(super) struct ReadCurve {
     pub curve: Curve,
     pub uncertainty: Option<Uncertainty>,
     pub provenance: Provenance,
     pub file: PathBuf,
+}
+
+/// A listed stack and its position in the text.
+pub(super) struct Listing {
+    pub stack: Stack,
+    pub offset: Option<usize>,
+    pub measured: Option<ReadCurve>,
 }
 
 /// Reads a `measured` or `predicted` curve and assigns it to its stack, which is appended to the list if it is new.
@@ -59,7 +67,7 @@ pub(super) fn given(
         findings.error(Some(offset), owner, problem);
     }
     wanted[place].offset.get_or_insert(offset);
-    wanted[place].measured = Some(Measured { curve, uncertainty, provenance, file });
+    wanted[place].measured = Some(ReadCurve { curve, uncertainty, provenance, file });
 }
 
 /// The path of a file inside the folder; names that lead out of it are errors.

@@ -5,6 +5,28 @@
 //! In frames of at most [`MAX`] bytes it detects every burst of up to 32 bits and every error of up to three bits.
 //!
 //! Cost: one pass over the bytes on either side, and one buffer of [`MAX`] bytes in the reader.
+//!
+//! # Example
+//!
+//! The line damages one of two messages. The reader reports it, and the other arrives:
+//!
+//! ```
+//! use protocol::link::frame::{self, Damage, Read, Reader};
+//! use protocol::link::message::{SCHEMA, ToBridge, VERSION};
+//!
+//! let hello = ToBridge::Hello { version: VERSION, schema: SCHEMA };
+//! let mut buffer = [0; frame::MAX];
+//! let length = frame::write(&hello, &mut buffer).unwrap();
+//! // A zero first ends whatever the line held before.
+//! let mut line = [&[0], &buffer[..length], &buffer[..length]].concat();
+//! line[3] ^= 0x20;
+//!
+//! let mut reader = Reader::new();
+//! let Read::Damaged(Damage::Checksum, rest) = reader.read(&line) else { panic!() };
+//! let Read::Message(message, rest) = reader.read(rest) else { panic!() };
+//! assert_eq!(frame::decode(message), Ok(hello));
+//! assert_eq!(reader.read(rest), Read::More);
+//! ```
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use heapless::Vec;

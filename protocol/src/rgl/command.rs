@@ -163,7 +163,7 @@ pub struct PaperCode(u8);
 
 impl PaperCode {
     /// The code of a paper.
-    pub fn of(paper: Paper) -> PaperCode {
+    pub fn from_paper(paper: Paper) -> PaperCode {
         PaperCode(paper.code())
     }
 
@@ -341,9 +341,9 @@ mod tests {
 
     #[test]
     fn a_declared_size_of_its_own_makes_a_named_paper_custom() {
-        let a4 = PaperCode::of(Paper::A4);
+        let a4 = PaperCode::from_paper(Paper::A4);
         assert_eq!(a4.paper(4800, 6372), Paper::A4);
         assert_eq!(a4.paper(4800, 6381), Paper::Custom { width: 4800, length: 6381 });
-        assert_eq!((a4.top(), PaperCode::of(Paper::Postcard).top()), (284, 71));
+        assert_eq!((a4.top(), PaperCode::from_paper(Paper::Postcard).top()), (284, 71));
     }
 }

@@ -57,7 +57,7 @@ pub const MAX_ENDING: usize = 5 + 5 + 4 + 1 + 4 + 2;
 pub type EndingBytes = Vec<u8, MAX_ENDING>;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Place {
+enum JobPhase {
     /// Not in the printer's language: before a job or after it.
     Outside,
     /// In the setup, or after the raster data.
@@ -82,7 +82,7 @@ enum Sheet {
 /// How a job would have to end at this point.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Ending {
-    place: Place,
+    place: JobPhase,
     sheet: Sheet,
 }
 
@@ -95,12 +95,12 @@ impl Default for Ending {
 impl Ending {
     /// Before the first command.
     pub const fn new() -> Ending {
-        Ending { place: Place::Outside, sheet: Sheet::Untouched }
+        Ending { place: JobPhase::Outside, sheet: Sheet::Untouched }
     }
 
     /// Takes the next event and returns whether the job can end after it.
     pub fn follow(&mut self, event: Event) -> bool {
-        use Place::{FedBack, LastPass, Outside, Pass, Raster, Selected};
+        use JobPhase::{FedBack, LastPass, Outside, Pass, Raster, Selected};
         match (event, self.place) {
             (Event::Reset | Event::Leave, _) => *self = Ending::new(),
             (Event::Select, Outside) => *self = Ending { place: Selected, sheet: Sheet::Untouched },
@@ -119,7 +119,7 @@ impl Ending {
 
     /// Whether a job has begun and has not ended.
     pub fn is_open(&self) -> bool {
-        self.place != Place::Outside
+        self.place != JobPhase::Outside
     }
 
     /// The bytes that end the job here: none if it has not begun or has ended.
@@ -129,18 +129,18 @@ impl Ending {
             // Each of the six commands is put at most once, so they fit.
             let _ = out.extend_from_slice(bytes);
         };
-        if self.place == Place::Outside {
+        if self.place == JobPhase::Outside {
             return out;
         }
-        if let Place::Pass(ink) | Place::FedBack(ink) = self.place
+        if let JobPhase::Pass(ink) | JobPhase::FedBack(ink) = self.place
             && self.sheet != Sheet::Ejected
         {
-            if let Place::Pass(_) = self.place {
+            if let JobPhase::Pass(_) = self.place {
                 put(&[ESC, SUB, 0, 0, FF]);
             }
             put(&[ESC, SUB, ink, LAST, b'r']);
         }
-        if self.place != Place::Selected {
+        if self.place != JobPhase::Selected {
             put(&[ESC, b'*', b'r', b'C']);
         }
         if self.sheet == Sheet::Printed {

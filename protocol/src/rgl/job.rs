@@ -66,7 +66,7 @@ impl JobWriter {
             put(Command::SelectRgl)?;
             put(Command::Resolution(page.resolution))?;
             put(Command::Media(page.media))?;
-            put(Command::Paper(PaperCode::of(page.paper)))?;
+            put(Command::Paper(PaperCode::from_paper(page.paper)))?;
             put(Command::Length(page.length()))?;
             put(Command::Width(page.width()))?;
             if let Some(list) = self.setup.cartridges() {
@@ -124,7 +124,7 @@ impl JobWriter {
         if self.row >= self.rows {
             return Err(Fault::TooManyRows);
         }
-        let extent = Extent::of(row);
+        let extent = Extent::of_row(row);
         self.order.fits(extent, u32::from(self.row))?;
         if out.len() < ROW_ROOM + row.len() {
             return Err(Fault::NoRoom);

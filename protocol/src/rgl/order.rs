@@ -85,7 +85,7 @@ pub(super) struct Extent {
 
 impl Extent {
     /// The extent of a plain row.
-    pub(super) fn of(row: &[u8]) -> Extent {
+    pub(super) fn of_row(row: &[u8]) -> Extent {
         Extent { bytes: row.len(), last: row.last().copied().unwrap_or(0) }
     }
 
@@ -229,7 +229,7 @@ impl Order {
                     })?;
                     Extent { bytes, last }
                 }
-                _ => Extent::of(data),
+                _ => Extent::of_row(data),
             };
             return self.accept_row(extent, last).map_err(|fault| Refusal::new(fault, 0));
         }

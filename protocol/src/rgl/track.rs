@@ -15,7 +15,7 @@ use heapless::Vec;
 const MAX_HEAD: usize = 8;
 
 #[derive(Clone, Copy)]
-enum Place {
+enum StreamPosition {
     /// Between commands, or in the head of one.
     Head,
     /// In the data of a command, so many bytes before its end.
@@ -26,7 +26,7 @@ enum Place {
 
 /// What has come of a job.
 #[derive(Clone, Copy)]
-struct Seen {
+struct JobTrace {
     ending: Ending,
     /// Whether there was a row, in this job or one before it in the stream.
     rows: bool,
@@ -36,11 +36,11 @@ struct Seen {
 
 /// Follows a stream.
 pub struct Track {
-    place: Place,
+    place: StreamPosition,
     head: Vec<u8, MAX_HEAD>,
-    now: Seen,
+    now: JobTrace,
     /// As it was at the last place where the job could end.
-    settled: Seen,
+    settled: JobTrace,
     /// Where in the last portion a job with rows was over, its final reset included.
     over: Option<usize>,
 }
@@ -54,8 +54,8 @@ impl Default for Track {
 impl Track {
     /// Before the first byte.
     pub const fn new() -> Track {
-        const NOTHING: Seen = Seen { ending: Ending::new(), rows: false, pass: 0, row: 0 };
-        Track { place: Place::Head, head: Vec::new(), now: NOTHING, settled: NOTHING, over: None }
+        const NOTHING: JobTrace = JobTrace { ending: Ending::new(), rows: false, pass: 0, row: 0 };
+        Track { place: StreamPosition::Head, head: Vec::new(), now: NOTHING, settled: NOTHING, over: None }
     }
 
     /// Follows some bytes. Returns how many of them stand up to the end of the last command after which the job can
@@ -66,30 +66,30 @@ impl Track {
         self.over = None;
         while at < bytes.len() {
             match self.place {
-                Place::Foreign => return Some(bytes.len()),
-                Place::Head => {
+                StreamPosition::Foreign => return Some(bytes.len()),
+                StreamPosition::Head => {
                     // There is room: a full head has been told apart below.
                     let _ = self.head.push(bytes[at]);
                     at += 1;
                     self.place = match length(&self.head) {
-                        Length::More if !self.head.is_full() => Place::Head,
-                        Length::More | Length::Unknown => Place::Foreign,
-                        Length::Whole => Place::Data(0),
-                        Length::Data(left) => Place::Data(left),
+                        Length::More if !self.head.is_full() => StreamPosition::Head,
+                        Length::More | Length::Unknown => StreamPosition::Foreign,
+                        Length::Whole => StreamPosition::Data(0),
+                        Length::Data(left) => StreamPosition::Data(left),
                     };
                 }
-                Place::Data(left) => {
+                StreamPosition::Data(left) => {
                     // A portion of 4 GB or more ends no earlier than any command.
                     let used = u32::try_from(bytes.len() - at).unwrap_or(u32::MAX).min(left);
                     at += used as usize;
-                    self.place = Place::Data(left - used);
+                    self.place = StreamPosition::Data(left - used);
                 }
             }
             match self.place {
-                Place::Data(0) => {
+                StreamPosition::Data(0) => {
                     let event = event(&self.head);
                     self.head.clear();
-                    self.place = Place::Head;
+                    self.place = StreamPosition::Head;
                     if event == Event::Reset && self.now.rows {
                         self.over.get_or_insert(at);
                     }
@@ -98,8 +98,8 @@ impl Track {
                         settled = Some(at);
                     }
                 }
-                Place::Foreign => return Some(bytes.len()),
-                Place::Head | Place::Data(_) => {}
+                StreamPosition::Foreign => return Some(bytes.len()),
+                StreamPosition::Head | StreamPosition::Data(_) => {}
             }
         }
         settled
@@ -112,7 +112,7 @@ impl Track {
 
     /// Whether the stream is not the printer's language.
     pub fn is_foreign(&self) -> bool {
-        matches!(self.place, Place::Foreign)
+        matches!(self.place, StreamPosition::Foreign)
     }
 
     /// Whether a row was complete at the last place where the job could end: before that, no sheet has been touched.
@@ -136,7 +136,7 @@ impl Track {
     }
 }
 
-impl Seen {
+impl JobTrace {
     fn follow(&mut self, event: Event) -> bool {
         match event {
             Event::InkSelect { .. } => (self.pass, self.row) = (self.pass.saturating_add(1), 0),

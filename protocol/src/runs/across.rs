@@ -45,7 +45,7 @@ impl Model {
     };
 
     /// The mean of run `index` of a row of this kind.
-    pub(super) fn of(&mut self, kind: u32, index: u32) -> &mut Mean {
+    pub(super) fn mean_of(&mut self, kind: u32, index: u32) -> &mut Mean {
         let kind = kind as usize % 4;
         if index == 0 { &mut self.first[kind] } else { &mut self.runs[kind][index as usize % 2] }
     }
@@ -229,7 +229,7 @@ impl Across {
             return &mut self.model.alike;
         }
         let kind = if self.escaped { self.kind & !CELLS } else { self.kind };
-        self.model.of(kind, self.index)
+        self.model.mean_of(kind, self.index)
     }
 
     /// Counts the ones of a code; some bits are held.

@@ -46,7 +46,7 @@ const PORTION: usize = 32;
 
 /// The result of [`Canvas::lay`].
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Laid {
+pub(super) enum TileProgress {
     /// There was nothing to lay out.
     Blank,
     /// There is more: call it again, and ink nothing in between.
@@ -114,10 +114,10 @@ impl Canvas {
 
     /// Lays the tile out in rows of `stride` bytes, starting with its first row, and begins the next tile. A tile that takes
     /// long is laid out only in part. Its place must be blank.
-    pub(super) fn lay(&mut self, tile: &Tile, rows: &mut [u8], stride: usize) -> Laid {
+    pub(super) fn lay(&mut self, tile: &Tile, rows: &mut [u8], stride: usize) -> TileProgress {
         let (first, end) = self.used;
         if first >= end {
-            return Laid::Blank;
+            return TileProgress::Blank;
         }
         if (tile.w, tile.h) != (EDGE, EDGE) {
             return self.lay_dots(tile, rows, stride);
@@ -136,7 +136,7 @@ impl Canvas {
                 put(left, right, shift, &mut row[at..]);
             }
         }
-        Laid::Whole
+        TileProgress::Whole
     }
 
     fn lay_squares(
@@ -169,7 +169,7 @@ impl Canvas {
     }
 
     /// Makes the table if it is another tile's, or lays out a portion of the line.
-    fn lay_dots(&mut self, tile: &Tile, rows: &mut [u8], stride: usize) -> Laid {
+    fn lay_dots(&mut self, tile: &Tile, rows: &mut [u8], stride: usize) -> TileProgress {
         // The way back is the way along, turned by half a circle.
         let (orientation, turned) = match tile.orientation {
             Orientation::Back => (Orientation::Along, Some((tile.h - 1) * EDGE + tile.w - 1)),
@@ -180,7 +180,7 @@ impl Canvas {
         if table.shape != Some(shape) {
             shape.fill(&mut table.dots);
             table.shape = Some(shape);
-            return Laid::Part;
+            return TileProgress::Part;
         }
         let (first, end) = self.used;
         let until = end.min(first + PORTION);
@@ -201,10 +201,10 @@ impl Canvas {
         }
         if until < end {
             self.used = (until, end);
-            return Laid::Part;
+            return TileProgress::Part;
         }
         self.used = UNUSED;
-        Laid::Whole
+        TileProgress::Whole
     }
 }
 

@@ -1,24 +1,11 @@
 //! Decodes a pass stream into bands of rows, in bounded memory and from input in any portions.
 
 use super::across::{Across, Stop};
-use super::canvas::{Canvas, Laid};
+use super::canvas::{Canvas, TileProgress};
 use super::rice::{Ahead, ESCAPE, Mean};
 use super::rows::{Inked, Rows};
-use super::{MOST_RUNS, PLAIN_BITS, band_bytes, form, stride};
+use super::{Defect, MOST_RUNS, PLAIN_BITS, band_bytes, form, stride};
 use crate::walk::{Placed, PlacedBand, Tile};
-
-/// What is wrong with a stream.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Defect {
-    /// A band begins with an unknown form.
-    Form,
-    /// A count of bands or rows is 0 or more than remain, or the side of cells is 0.
-    Count,
-    /// A row is longer than the page is wide, has dots beyond its width, or ends in the middle of a run.
-    Row,
-    /// The memory for a band is smaller than [`band_bytes`].
-    Memory,
-}
 
 /// The result of [`Decoder::step`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -50,7 +37,7 @@ enum State {
     Blank,
     Minimum,
     Runs(Runs),
-    Row(Row),
+    Row(RowState),
     Side,
     Across(Across),
     End,
@@ -84,7 +71,7 @@ struct Runs {
 }
 
 /// Where in a rows band the decoder is.
-struct Row {
+struct RowState {
     /// Row of the band.
     y: u16,
     part: RowPart,
@@ -213,7 +200,7 @@ impl Decoder {
                             self.canvas.clear();
                             State::Minimum
                         }
-                        form::ROWS => State::Row(Row { y: 0, part: RowPart::Head }),
+                        form::ROWS => State::Row(RowState { y: 0, part: RowPart::Head }),
                         form::ACROSS => State::Side,
                         _ => return Err(Defect::Form),
                     };
@@ -240,7 +227,7 @@ impl Decoder {
                 }
                 State::Runs(runs) => {
                     let mut place =
-                        Place { band, stride, memory, canvas: &mut self.canvas, inked: &mut self.inked };
+                        BandTarget { band, stride, memory, canvas: &mut self.canvas, inked: &mut self.inked };
                     let (used, complete) = runs.read(&input[read..], &mut place);
                     read += used;
                     if !complete {
@@ -285,7 +272,7 @@ impl Decoder {
 }
 
 /// Where the dots of a runs band go.
-struct Place<'d> {
+struct BandTarget<'d> {
     band: PlacedBand,
     stride: usize,
     memory: &'d mut [u8],
@@ -315,7 +302,7 @@ impl Runs {
     }
 
     /// Reads runs until the band is full or others may run. Returns how much was read and whether it is full.
-    fn read(&mut self, input: &[u8], place: &mut Place<'_>) -> (usize, bool) {
+    fn read(&mut self, input: &[u8], place: &mut BandTarget<'_>) -> (usize, bool) {
         let mut read = 0;
         self.pause = false;
         while self.done < place.band.len() {
@@ -357,7 +344,7 @@ impl Runs {
     }
 
     /// Reads codes while they are short and complete, and returns how much was read. To be called between two codes.
-    fn read_codes(&mut self, input: &[u8], place: &mut Place<'_>) -> usize {
+    fn read_codes(&mut self, input: &[u8], place: &mut BandTarget<'_>) -> usize {
         let len = place.band.len();
         let mut codes = Ahead::new(input, self.bits, self.held);
         let mut runs = 0;
@@ -392,7 +379,7 @@ impl Runs {
     }
 
     /// A value is complete: `bits` of it stood as they are.
-    fn take(&mut self, bits: u32, count: u32, place: &mut Place<'_>) {
+    fn take(&mut self, bits: u32, count: u32, place: &mut BandTarget<'_>) {
         let length = if self.index == 0 {
             bits
         } else {
@@ -406,7 +393,7 @@ impl Runs {
     }
 
     /// A run is known, in a band of `len` dots.
-    fn run(&mut self, length: u32, len: u32, place: &mut Place<'_>) {
+    fn run(&mut self, length: u32, len: u32, place: &mut BandTarget<'_>) {
         self.end = self.done.saturating_add(length).min(len);
         if self.index.is_multiple_of(2) {
             self.done = self.end;
@@ -420,7 +407,7 @@ impl Runs {
     }
 
     /// Inks the run under way to its end, or until something has been laid out.
-    fn ink(&mut self, place: &mut Place<'_>) {
+    fn ink(&mut self, place: &mut BandTarget<'_>) {
         while self.done < self.end && !self.pause {
             if self.done < self.to {
                 let to = self.end.min(self.to);
@@ -440,20 +427,20 @@ impl Runs {
     }
 
     /// Lays the tile out in the band, or a part of it; there is none any more when it is done.
-    fn lay(&mut self, place: &mut Place<'_>) {
+    fn lay(&mut self, place: &mut BandTarget<'_>) {
         let Some(tile) = &self.tile else { return };
         let laid = place.canvas.lay(tile, place.memory, place.stride);
-        self.pause |= laid != Laid::Blank;
-        if laid != Laid::Blank {
+        self.pause |= laid != TileProgress::Blank;
+        if laid != TileProgress::Blank {
             place.inked.add(usize::from(tile.x / 8), usize::from((tile.x + tile.w).div_ceil(8)));
         }
-        if laid != Laid::Part {
+        if laid != TileProgress::Part {
             self.tile = None;
         }
     }
 }
 
-impl Row {
+impl RowState {
     /// Reads rows until the band is full. Returns how much was read and whether it is full.
     fn read(&mut self, input: &[u8], rows: &mut Rows<'_>) -> Result<(usize, bool), Defect> {
         let Rows { stride, height, width, .. } = *rows;

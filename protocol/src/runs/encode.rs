@@ -1,8 +1,9 @@
 //! A plane as a pass stream.
 
+use super::bit_writer::BitWriter;
 use super::encode_across::put_across;
 use super::rice::{ESCAPE, Mean};
-use super::{PLAIN_BITS, band_bytes, form, stride};
+use super::{MAX_STRIDE, PLAIN_BITS, band_bytes, form, stride};
 use crate::packbits;
 use crate::walk::{EDGE, MOST, Placed, PlacedBand, Tile};
 use heapless::Vec;
@@ -13,8 +14,6 @@ pub const MAX_BAND: usize = 1 + EDGE as usize * (2 + MAX_STRIDE);
 
 /// How many times shorter than packed rows runs have to be.
 const WORTH: usize = 2;
-
-pub(super) const MAX_STRIDE: usize = 1235;
 
 /// A buffer is too small, a page wider than 9880 dots, or `bits` shorter than the plane.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -90,7 +89,7 @@ impl Table {
         Table { shape: None, dots: [0; MOST] }
     }
 
-    fn of(&mut self, tile: &Tile) -> &[u16] {
+    fn dots_of(&mut self, tile: &Tile) -> &[u16] {
         let shape = Tile { x: 0, y: 0, ..*tile };
         if self.shape != Some(shape) {
             tile.fill(&mut self.dots);
@@ -134,7 +133,7 @@ fn for_each_run(
             length += u32::from(tile.area());
             continue;
         }
-        for &dot in table.of(&tile) {
+        for &dot in table.dots_of(&tile) {
             let bit = columns[usize::from(dot / EDGE)] >> (EDGE - 1 - dot % EDGE) & 1;
             if bit != on {
                 run(length)?;
@@ -166,7 +165,7 @@ fn put_runs(
     let [head, codes @ ..] = out else { return None };
     let [least, codes @ ..] = codes else { return None };
     (*head, *least) = (form::RUNS, u8::try_from(minimum).unwrap_or(u8::MAX));
-    let mut bits = Bits::new(codes);
+    let mut bits = BitWriter::new(codes);
     let mut means = [Mean::START; 2];
     let mut index = 0;
     for_each_run(band, rows, stride, table, |length| {
@@ -191,59 +190,27 @@ fn put_runs(
     bits.end().map(|length| 2 + length)
 }
 
-/// Writes bits from the top of each byte.
-pub(super) struct Bits<'o> {
-    out: &'o mut [u8],
-    at: usize,
-    pending: u32,
-    held: u32,
-}
-
-impl<'o> Bits<'o> {
-    pub(super) fn new(out: &'o mut [u8]) -> Bits<'o> {
-        Bits { out, at: 0, pending: 0, held: 0 }
-    }
-
-    /// Puts the low `count` (at most 21) bits of `value`, which has no others.
-    pub(super) fn put(&mut self, value: u32, count: u32) -> Option<()> {
-        self.pending = self.pending << count | value;
-        self.held += count;
-        while self.held >= 8 {
-            self.held -= 8;
-            *self.out.get_mut(self.at)? = (self.pending >> self.held & 0xff) as u8;
-            self.at += 1;
-        }
-        Some(())
-    }
-
-    pub(super) fn end(mut self) -> Option<usize> {
-        let rest = (8 - self.held % 8) % 8;
-        self.put(0, rest)?;
-        Some(self.at)
-    }
-}
-
 /// How a row is written.
-enum Row {
+enum RowForm {
     Same,
     Packed(usize),
     Plain(usize),
 }
 
 /// Calls `row` for each row of a band with how it is written and its bytes. The caller counts equal rows.
-fn for_each_row(rows: &[u8], stride: usize, mut row: impl FnMut(Row, &[u8]) -> Option<()>) -> Option<()> {
+fn for_each_row(rows: &[u8], stride: usize, mut row: impl FnMut(RowForm, &[u8]) -> Option<()>) -> Option<()> {
     let mut packed = [0; MAX_STRIDE];
     let mut above: &[u8] = &[];
     for bits in rows.chunks_exact(stride) {
         let trimmed = &bits[..bits.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1)];
         if trimmed == above {
-            row(Row::Same, &[])?;
+            row(RowForm::Same, &[])?;
         } else if trimmed.is_empty() {
-            row(Row::Packed(0), &[])?;
+            row(RowForm::Packed(0), &[])?;
         } else {
             match packbits::pack_into(trimmed, &mut packed[..trimmed.len() - 1]) {
-                Some(length) => row(Row::Packed(length), &packed[..length])?,
-                None => row(Row::Plain(trimmed.len()), trimmed)?,
+                Some(length) => row(RowForm::Packed(length), &packed[..length])?,
+                None => row(RowForm::Plain(trimmed.len()), trimmed)?,
             }
         }
         above = trimmed;
@@ -255,12 +222,12 @@ fn rows_length(rows: &[u8], stride: usize) -> usize {
     let (mut length, mut same) = (1, false);
     for_each_row(rows, stride, |row, _| {
         length += match row {
-            Row::Same if same => 0,
-            Row::Same => 2,
-            Row::Packed(bytes) => varint(2 * bytes + 1).len() + bytes,
-            Row::Plain(bytes) => varint(2 * bytes).len() + bytes,
+            RowForm::Same if same => 0,
+            RowForm::Same => 2,
+            RowForm::Packed(bytes) => varint(2 * bytes + 1).len() + bytes,
+            RowForm::Plain(bytes) => varint(2 * bytes).len() + bytes,
         };
-        same = matches!(row, Row::Same);
+        same = matches!(row, RowForm::Same);
         Some(())
     });
     length
@@ -272,7 +239,7 @@ fn put_rows(rows: &[u8], stride: usize, out: &mut [u8]) -> Option<usize> {
     let mut same = 0u8;
     for_each_row(rows, stride, |row, data| {
         let head = match row {
-            Row::Same => {
+            RowForm::Same => {
                 // At most 64 rows, so the count never overflows.
                 if same == 0 {
                     *out.get_mut(at)? = 0;
@@ -282,8 +249,8 @@ fn put_rows(rows: &[u8], stride: usize, out: &mut [u8]) -> Option<usize> {
                 *out.get_mut(at - 1)? = same;
                 return Some(());
             }
-            Row::Packed(length) => varint(2 * length + 1),
-            Row::Plain(length) => varint(2 * length),
+            RowForm::Packed(length) => varint(2 * length + 1),
+            RowForm::Plain(length) => varint(2 * length),
         };
         same = 0;
         let end = at + head.len() + data.len();

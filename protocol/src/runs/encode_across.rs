@@ -5,9 +5,9 @@
 //! side of the cells is estimated from how many runs are multiples of each.
 
 use super::across::{CELLS, DIFFERENCE, KIND_BITS, LENGTH_BITS, Model, ONES, in_cells};
-use super::encode::{Bits, MAX_STRIDE};
+use super::bit_writer::BitWriter;
 use super::rice::Mean;
-use super::{form, stride};
+use super::{MAX_STRIDE, form, stride};
 use heapless::Vec;
 
 /// Columns at which a row changes between off and on.
@@ -29,7 +29,7 @@ pub(super) fn put_across(rows: &[u8], width: u16, out: &mut [u8]) -> Option<usiz
     let side = side(rows, stride, &mut changes);
     let [head, unit, codes @ ..] = out else { return None };
     (*head, *unit) = (form::ACROSS, side);
-    let mut bits = Bits::new(codes);
+    let mut bits = BitWriter::new(codes);
     let mut model = Model::START;
     let mut difference = Changes::new();
     let mut above: &[u8] = &[];
@@ -41,7 +41,7 @@ pub(super) fn put_across(rows: &[u8], width: u16, out: &mut [u8]) -> Option<usiz
         let mut best = (u32::MAX, 0);
         for kind in (0..4).filter(|kind| kind & kinds == *kind) {
             let mut length = 0;
-            let row = Row { kind, changes: of(kind), width, side };
+            let row = RunRow { kind, changes: of(kind), width, side };
             let complete = row.put(&mut { model }, &mut |_, count| {
                 length += count;
                 (length < best.0).then_some(())
@@ -52,7 +52,7 @@ pub(super) fn put_across(rows: &[u8], width: u16, out: &mut [u8]) -> Option<usiz
         }
         let kind = best.1;
         bits.put(kind, KIND_BITS)?;
-        Row { kind, changes: of(kind), width, side }
+        RunRow { kind, changes: of(kind), width, side }
             .put(&mut model, &mut |value, count| bits.put(value, count))?;
         put_dots(&mut model.alike, alike, &mut |value, count| bits.put(value, count))?;
         above = row;
@@ -131,14 +131,14 @@ fn wide(bytes: &[u8]) -> u64 {
 }
 
 /// A row to write.
-struct Row<'c> {
+struct RunRow<'c> {
     kind: u32,
     changes: &'c [u16],
     width: u16,
     side: u8,
 }
 
-impl Row<'_> {
+impl RunRow<'_> {
     /// Puts the runs.
     fn put(&self, model: &mut Model, put: &mut impl FnMut(u32, u32) -> Option<()>) -> Option<()> {
         let side = u32::from(self.side);
@@ -154,7 +154,7 @@ impl Row<'_> {
         let cells = in_cells(self.kind, index);
         let unit = if cells { side } else { 1 };
         let value = left.div_ceil(unit) - u32::from(index > 0);
-        let mean = model.of(self.kind, index);
+        let mean = model.mean_of(self.kind, index);
         let k = mean.parameter();
         if (value >> k) + k < ONES {
             mean.add(value);
@@ -174,7 +174,7 @@ impl Row<'_> {
     ) -> Option<()> {
         let mut kind = self.kind;
         if in_cells(kind, index) {
-            let (value, mean) = ((length / side).saturating_sub(1), model.of(kind, index));
+            let (value, mean) = ((length / side).saturating_sub(1), model.mean_of(kind, index));
             let k = mean.parameter();
             if length.is_multiple_of(side) && value >> k < ONES {
                 mean.add(value);
@@ -183,7 +183,7 @@ impl Row<'_> {
             put((1 << (ONES + 1)) - 2, ONES + 1)?;
             kind &= !CELLS;
         }
-        put_dots(model.of(kind, index), length - u32::from(index > 0), put)
+        put_dots(model.mean_of(kind, index), length - u32::from(index > 0), put)
     }
 }
 

@@ -110,7 +110,7 @@ impl Header {
             page.resolution.code(),
             media,
             media2,
-            PaperCode::of(page.paper).code(),
+            PaperCode::from_paper(page.paper).code(),
         ]);
         out[9] = u8::from(page.curl_correction);
         let frame = self.walk.frame();
@@ -157,7 +157,7 @@ impl Header {
         let media = Media::from_code([fixed[2], fixed[3]]).ok_or(HeaderError::Unknown)?;
         let code = PaperCode::from_code(fixed[4]).ok_or(HeaderError::Unknown)?;
         let (width, length) = (word(5), word(7));
-        let paper = match Paper::named().find(|paper| PaperCode::of(*paper) == code) {
+        let paper = match Paper::named().find(|paper| PaperCode::from_paper(*paper) == code) {
             Some(paper) if (width, length) == (0, 0) => paper,
             Some(_) => return Err(HeaderError::Unknown),
             None => Paper::Custom { width, length },

@@ -51,8 +51,35 @@
 //! row or the band. Each kind has a count and a sum for its first runs (4 and 32), its off and its on runs (4 and 32 in
 //! dots, 4 and 8 in cells); the numbers of rows have one pair (4 and 8). A row is complete when it has as many dots as the
 //! page is wide, and what would go beyond is cut.
+//!
+//! # Example
+//!
+//! A plane of two bands, of which the first is blank, takes its way through a stream. A band of unknown form is a defect:
+//!
+//! ```
+//! use protocol::runs::{self, Decoder, Defect, MAX_BAND, Step};
+//! use protocol::walk::Placed;
+//!
+//! let walk = Placed::whole(128, 128);
+//! let mut plane = vec![0; 128 / 8 * 128];
+//! plane[16 * 64..].fill(0b1111_0000);
+//! let mut stream = Vec::new();
+//! runs::encode(&walk, &plane, &mut vec![0; MAX_BAND], |band| stream.extend(band)).unwrap();
+//! assert!(stream.len() < 16);
+//!
+//! let (mut decoder, mut memory) = (Decoder::new(walk), vec![0; runs::band_bytes(128)]);
+//! let (read, step) = decoder.step(&stream, &mut memory).unwrap();
+//! assert_eq!(step, Step::Blank { y: 0, rows: 64 });
+//! let (_, step) = decoder.step(&stream[read..], &mut memory).unwrap();
+//! assert_eq!(step, Step::Band { y: 64, rows: 64, reach: 16 });
+//! assert_eq!(memory, plane[16 * 64..]);
+//!
+//! decoder.restart();
+//! assert_eq!(decoder.step(&[9], &mut memory), Err(Defect::Form));
+//! ```
 
 mod across;
+mod bit_writer;
 mod canvas;
 mod decode;
 mod encode;
@@ -61,7 +88,7 @@ mod header;
 mod rice;
 mod rows;
 
-pub use decode::{Decoder, Defect, Step};
+pub use decode::{Decoder, Step};
 pub use encode::{MAX_BAND, NoRoom, encode};
 pub use header::{Header, HeaderError, MAX_HEADER};
 
@@ -75,6 +102,19 @@ pub fn band_bytes(width: u16) -> usize {
     stride(width) * usize::from(crate::walk::EDGE)
 }
 
+/// What is wrong with a stream.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Defect {
+    /// A band begins with an unknown form.
+    Form,
+    /// A count of bands or rows is 0 or more than remain, or the side of cells is 0.
+    Count,
+    /// A row is longer than the page is wide, has dots beyond its width, or ends in the middle of a run.
+    Row,
+    /// The memory for a band is smaller than [`band_bytes`].
+    Memory,
+}
+
 /// First byte of a band.
 mod form {
     pub const BLANK: u8 = 0;
@@ -82,6 +122,9 @@ mod form {
     pub const ROWS: u8 = 2;
     pub const ACROSS: u8 = 3;
 }
+
+/// Bytes of the widest row.
+const MAX_STRIDE: usize = 1235;
 
 /// Runs that are decoded before others may run: 6 µs each at most on a microcontroller.
 const MOST_RUNS: u32 = 64;

@@ -260,7 +260,7 @@ fn a_plane() -> impl Strategy<Value = (u16, u16, Vec<u8>)> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 128, ..ProptestConfig::default() })]
+    #![proptest_config(testing::cases(128))]
 
     #[test]
     fn a_stream_is_its_plane_whatever_the_portions(

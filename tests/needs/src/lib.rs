@@ -19,7 +19,7 @@ pub enum Need {
     Reference,
     /// Python with NumPy.
     Numpy,
-    /// A print server, Ghostscript and Poppler; for the server, root too.
+    /// A print server and Ghostscript; for the server, root too.
     Queue,
     /// The firmware's image and Node, which `cargo xtask emulator` brings.
     Emulator,

@@ -10,3 +10,20 @@ pub mod damage;
 pub mod program;
 
 pub use needs;
+
+use proptest::test_runner::Config;
+
+/// What a property test with cases dearer or cheaper than usual tries: so many where others try 64, and in proportion where
+/// `PROPTEST_CASES` asks for more.
+pub fn cases(of_64: u32) -> Config {
+    let usual = Config::default();
+    Config {
+        cases: (u64::from(of_64) * u64::from(usual.cases) / 64).clamp(1, u32::MAX.into()) as u32,
+        ..usual
+    }
+}
+
+/// Whether everything is tried as it stands, not only as much as a change should wait for: `cargo xtask test --full`.
+pub fn is_full() -> bool {
+    std::env::var_os("FOILPRESS_FULL").is_some_and(|value| !value.is_empty())
+}

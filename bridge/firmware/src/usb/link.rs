@@ -2,7 +2,7 @@
 
 use super::{BulkIn, BulkOut, PACKET, Usb};
 use crate::shared::{Shared, Side};
-use crate::{keep, stack, trace};
+use crate::{retained, stack, trace};
 use bridge::links::Way;
 use embassy_futures::select::{Either, select};
 use embassy_usb::class::cdc_acm::{ControlChanged, Receiver, Sender};
@@ -60,7 +60,7 @@ pub async fn answer(shared: &'static Shared, mut serial: Sender<'static, Usb>, m
         while let Some(way) = shared.links(|links, _| links.speaker()) {
             let length = shared.engine(|engine| {
                 if let Some(from) = engine.log_wanted() {
-                    let (at, end, count) = keep::read_log(from, &mut frame[..DATA_MAX]);
+                    let (at, end, count) = retained::read_log(from, &mut frame[..DATA_MAX]);
                     engine.log(at, end, &frame[..count]);
                 }
                 if engine.usage_wanted() {

@@ -5,10 +5,10 @@
 //! rounding to 16 bits. Writing fills a temporary folder and renames it at the end.
 
 use std::collections::BTreeMap;
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::Path;
 
-use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use image::ExtendedColorType;
 use inks::Curve;
 use serde::{Deserialize, Serialize};
 
@@ -109,10 +109,10 @@ pub fn write(
             out.copy_from_slice(&to_grey(factored.maps.at(pixel)[basis]).to_ne_bytes());
         }
         let at = inside.join(&file);
-        let output = BufWriter::new(std::fs::File::create_new(&at).map_err(io(&at, "write"))?);
-        PngEncoder::new(output)
-            .write_image(&row, width as u32, height as u32, ExtendedColorType::L16)
+        let mut output = std::fs::File::create_new(&at).map_err(io(&at, "write"))?;
+        let picture = pictures::png(&row, (width as u32, height as u32), ExtendedColorType::L16)
             .map_err(|error| io(&at, "write")(std::io::Error::other(error)))?;
+        output.write_all(&picture).map_err(io(&at, "write"))?;
         maps.push(file);
     }
     let at = inside.join(BASES);
@@ -309,7 +309,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(16))]
+        #![proptest_config(testing::cases(16))]
         #[test]
         fn reading_gives_back_what_was_written(
             width in 1usize..9, height in 1usize..9, bases in 1usize..6, seed in any::<u32>(),

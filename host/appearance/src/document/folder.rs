@@ -21,7 +21,7 @@ use crate::brdf::Space;
 use crate::materials::{Surface, Surfaces, dielectric, metallic, specular};
 
 use files::Files;
-pub(super) use settings::{SETTINGS, Settings, Workflow};
+pub(super) use settings::{FolderSettings, SETTINGS, Workflow};
 
 struct Reader<'a, 'b> {
     files: Files,
@@ -204,7 +204,7 @@ fn rgb(fields: &[Field; 3], pixel: usize) -> [f32; 3] {
 }
 
 /// The workflow of the maps found.
-fn workflow_of(files: &Files, settings: &Settings) -> Result<Workflow, DocumentError> {
+fn workflow_of(files: &Files, settings: &FolderSettings) -> Result<Workflow, DocumentError> {
     let has = |role| files.by_role.iter().any(|(r, _)| *r == role);
     let rough = has(Role::Roughness) || has(Role::Packed) || settings.roughness.is_some();
     match (rough, has(Role::Glossiness)) {
@@ -224,7 +224,7 @@ fn workflow_of(files: &Files, settings: &Settings) -> Result<Workflow, DocumentE
 
 fn roughness_metallic(
     reader: &mut Reader<'_, '_>,
-    settings: &Settings,
+    settings: &FolderSettings,
 ) -> Result<(Field, Field), DocumentError> {
     let mut roughness = reader.single(Role::Roughness)?;
     let mut metal = reader.single(Role::Metallic)?;

@@ -147,12 +147,12 @@ fn count_maps(material: &json::Material) -> u64 {
 /// The parameters of a material, each a map or a constant.
 struct Layers {
     base: [Field; 3],
-    kind: Kind,
+    kind: PbrWorkflow,
     /// Slope variance of the normal map, at the size of that map.
     variance: Option<Field>,
 }
 
-enum Kind {
+enum PbrWorkflow {
     Metallic { roughness: Field, metal: Field, f0: [Field; 3], level: Field },
     Specular { f0: [Field; 3], gloss: Field },
 }
@@ -182,7 +182,7 @@ fn layers(
                     (old.specular_factor.0.map(Field::Constant), Field::Constant(old.glossiness_factor.0))
                 }
             };
-            (base, Kind::Specular { f0, gloss })
+            (base, PbrWorkflow::Specular { f0, gloss })
         }
         None => {
             let pbr = &material.pbr_metallic_roughness;
@@ -228,7 +228,7 @@ fn layers(
                 }
                 None => ([plain; 3].map(Field::Constant), Field::Constant(1.0)),
             };
-            (base, Kind::Metallic { roughness, metal, f0, level })
+            (base, PbrWorkflow::Metallic { roughness, metal, f0, level })
         }
     };
     let variance = match &material.normal_texture {
@@ -281,10 +281,10 @@ fn build(
     let Layers { base, kind, variance } = layers;
     let mut others: Vec<Option<(usize, usize)>> = vec![variance.as_ref().and_then(Field::size)];
     match &kind {
-        Kind::Metallic { roughness, metal, f0, level } => {
+        PbrWorkflow::Metallic { roughness, metal, f0, level } => {
             others.extend([roughness.size(), metal.size(), f0[0].size(), level.size()]);
         }
-        Kind::Specular { f0, gloss } => others.extend([f0[0].size(), gloss.size()]),
+        PbrWorkflow::Specular { f0, gloss } => others.extend([f0[0].size(), gloss.size()]),
     }
     let largest = others.iter().flatten().copied().max_by_key(|&(w, h)| w * h);
     let chosen = base[0].size().or(largest);
@@ -311,7 +311,7 @@ fn build(
         std::array::from_fn(|c| fields[c].at(i).clamp(0.0, 1.0))
     };
     let surfaces = match kind {
-        Kind::Metallic { roughness, metal, f0, level } => {
+        PbrWorkflow::Metallic { roughness, metal, f0, level } => {
             let (roughness, metal, f0, level) = (fit(roughness), fit(metal), f0.map(fit), fit(level));
             Surfaces::build(width, height, space, move |i| {
                 let level = level.at(i).clamp(0.0, 1.0);
@@ -322,7 +322,7 @@ fn build(
                 surface
             })
         }
-        Kind::Specular { f0, gloss } => {
+        PbrWorkflow::Specular { f0, gloss } => {
             let (f0, gloss) = (f0.map(fit), fit(gloss));
             Surfaces::build(width, height, space, move |i| {
                 let mut surface = specular(rgb(&base, i), rgb(&f0, i), gloss.at(i).clamp(0.0, 1.0));

@@ -206,7 +206,7 @@ fn truncated_files_give_errors() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(1000))]
+    #![proptest_config(testing::cases(1000))]
     #[test]
     fn damaged_files_give_documents_or_errors(
         which in prop::sample::select(victims()).no_shrink(),

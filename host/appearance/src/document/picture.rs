@@ -3,11 +3,9 @@
 //! The contents of a file decide its format; a name that disagrees gives a note. Dimensions are checked before anything of
 //! that size is allocated. Floating-point images must be finite.
 
-use std::io::Cursor;
 use std::path::Path;
 
-use exr::prelude::{ReadChannels, ReadLayers};
-use image::{DynamicImage, ImageDecoder, ImageFormat};
+use image::{DynamicImage, ImageFormat};
 use rayon::prelude::*;
 
 use super::content::ColourSpace;
@@ -233,22 +231,15 @@ fn decode_image(bytes: &[u8], format: ImageFormat, path: &Path) -> Result<Pictur
             _ => format!("cannot decode the image: {error}"),
         })
     };
-    let mut limits = image::Limits::default();
-    limits.max_image_width = Some(MOST_SIDE as u32);
-    limits.max_image_height = Some(MOST_SIDE as u32);
-    limits.max_alloc = Some(4 * MOST_VALUES);
-    let mut reader = image::ImageReader::with_format(Cursor::new(bytes), format);
-    reader.limits(limits);
-    let mut decoder = reader.into_decoder().map_err(damaged)?;
-    let (width, height) = decoder.dimensions();
-    let channels = u64::from(decoder.color_type().channel_count());
-    let bytes = decoder.color_type().bytes_per_pixel();
-    let most = if u64::from(bytes) == 4 * channels { MOST_FLOATS } else { MOST_VALUES };
+    let bounds = pictures::Bounds { side: Some(MOST_SIDE as u32), bytes: 4 * MOST_VALUES };
+    let mut opened = pictures::open(bytes, format, bounds).map_err(damaged)?;
+    let ((width, height), colour) = (opened.size(), opened.colour());
+    let channels = u64::from(colour.channel_count());
+    let most = if u64::from(colour.bytes_per_pixel()) == 4 * channels { MOST_FLOATS } else { MOST_VALUES };
     check_size(path, u64::from(width), u64::from(height), channels, most)?;
     // A damaged profile does not matter.
-    let foreign_profile =
-        decoder.icc_profile().is_ok_and(|profile| profile.is_some_and(|bytes| !is_srgb(&bytes)));
-    let decoded = DynamicImage::from_decoder(decoder).map_err(damaged)?;
+    let foreign_profile = opened.profile().is_some_and(|bytes| !is_srgb(&bytes));
+    let decoded = opened.decode().map_err(damaged)?;
     let (width, height) = (decoded.width() as usize, decoded.height() as usize);
     let picture = |channels, values| Picture { width, height, channels, values, foreign_profile };
     Ok(match decoded {
@@ -271,47 +262,11 @@ fn decode_image(bytes: &[u8], format: ImageFormat, path: &Path) -> Result<Pictur
     })
 }
 
-/// OpenEXR files name their channels freely. Supported are `R`, `G`, `B`; `Y`; and a single channel of any name.
 fn decode_exr(bytes: &[u8], path: &Path) -> Result<Picture, DocumentError> {
     let wrong = |problem: String| DocumentError::Picture { path: path.to_path_buf(), problem };
-    let damaged = |error: exr::error::Error| wrong(format!("cannot decode the image: {error}"));
-    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
-    for header in &meta.headers {
-        let size = header.layer_size;
-        let channels = header.channels.list.len() as u64;
-        check_size(path, size.width() as u64, size.height() as u64, channels, MOST_FLOATS)?;
+    for (width, height, channels) in pictures::exr_sizes(bytes).map_err(wrong)? {
+        check_size(path, width as u64, height as u64, channels as u64, MOST_FLOATS)?;
     }
-    let image = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .first_valid_layer()
-        .all_attributes()
-        .non_parallel()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(damaged)?;
-    let layer = image.layer_data;
-    let (width, height) = (layer.size.width(), layer.size.height());
-    let list = &layer.channel_data.list;
-    let named = |name: &str| list.iter().find(|channel| channel.name.eq(name));
-    let chosen = match (named("R"), named("G"), named("B"), named("Y")) {
-        (Some(r), Some(g), Some(b), _) => vec![r, g, b],
-        (_, _, _, Some(y)) => vec![y],
-        _ if list.len() == 1 => vec![&list[0]],
-        _ => {
-            let names: Vec<String> = list.iter().map(|channel| channel.name.to_string()).collect();
-            return Err(wrong(format!("expected the channels R, G, B or Y, found {}", names.join(", "))));
-        }
-    };
-    let channels = chosen.len();
-    let mut values = vec![0.0; width * height * channels];
-    for (c, channel) in chosen.into_iter().enumerate() {
-        if channel.sample_data.len() != width * height {
-            return Err(wrong(format!("channel {} is subsampled, which is not supported", channel.name)));
-        }
-        for (pixel, value) in values.chunks_exact_mut(channels).zip(channel.sample_data.values_as_f32()) {
-            pixel[c] = value;
-        }
-    }
+    let pictures::Floats { width, height, channels, values } = pictures::exr(bytes).map_err(wrong)?;
     Ok(Picture { width, height, channels, values: Values::Float(values), foreign_profile: false })
 }

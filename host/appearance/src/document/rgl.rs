@@ -51,7 +51,7 @@ struct Grid<'a> {
 
 /// A position in a grid: its cell, and the weights of the right and lower neighbours.
 #[derive(Clone, Copy)]
-struct Place {
+struct GridPosition {
     x: usize,
     y: usize,
     s: f64,
@@ -59,21 +59,21 @@ struct Place {
 }
 
 impl Grid<'_> {
-    fn place(&self, u: f64, v: f64) -> Place {
+    fn place(&self, u: f64, v: f64) -> GridPosition {
         let cell = |p: f64, n: usize| {
             let p = p.clamp(0.0, 1.0) * (n - 1) as f64;
             let at = (p as usize).min(n - 2);
             (at, p - at as f64)
         };
         let ((x, s), (y, t)) = (cell(u, self.width), cell(v, self.height));
-        Place { x, y, s, t }
+        GridPosition { x, y, s, t }
     }
 
     fn value(&self, x: usize, y: usize) -> f64 {
         f64::from(self.data[y * self.width + x])
     }
 
-    fn bilinear(&self, p: Place) -> f64 {
+    fn bilinear(&self, p: GridPosition) -> f64 {
         let row = |y| self.value(p.x, y) * (1.0 - p.s) + self.value(p.x + 1, y) * p.s;
         row(p.y) * (1.0 - p.t) + row(p.y + 1) * p.t
     }
@@ -231,7 +231,7 @@ impl Measured {
         let value = |i| at(|d| &d.values, i);
         let along = |i| at(|d| &d.along, i);
         let down = |i| at(|d| &d.down, i);
-        let Place { x, y, s: fx, t: fy } = Grid { width: w, height: h, data: &[] }.place(u, v);
+        let GridPosition { x, y, s: fx, t: fy } = Grid { width: w, height: h, data: &[] }.place(u, v);
         let i = y * w + x;
         // Density along u at this v, at the two ends of the patch.
         let left = value(i) * (1.0 - fy) + value(i + w) * fy;

@@ -1,13 +1,13 @@
 //! A sample as a document: opened from memory, or written as a folder of texture maps.
 
+use std::io::Write as _;
 use std::path::Path;
 
-use image::{ImageEncoder, codecs::png::PngEncoder};
 use observe::Observer;
 
 use super::content::{ColourSpace, Content, Document};
 use super::error::DocumentError;
-use super::folder::{SETTINGS, Settings, Workflow};
+use super::folder::{FolderSettings, SETTINGS, Workflow};
 use super::source::Source;
 use crate::brdf::Space;
 use crate::sample::{Finish, Sample};
@@ -21,12 +21,12 @@ pub fn write_sample(sample: &Sample, folder: &Path) -> Result<(), DocumentError>
     let painting = sample.draw();
     for (file, data, colour) in painting.maps() {
         let path = folder.join(file);
-        let output = std::fs::File::create_new(&path).map_err(io(&path))?;
-        PngEncoder::new(std::io::BufWriter::new(output))
-            .write_image(&data, painting.width as u32, painting.height as u32, colour)
+        let mut output = std::fs::File::create_new(&path).map_err(io(&path))?;
+        let picture = pictures::png(&data, (painting.width as u32, painting.height as u32), colour)
             .map_err(|error| io(&path)(std::io::Error::other(error)))?;
+        output.write_all(&picture).map_err(io(&path))?;
     }
-    let settings = Settings {
+    let settings = FolderSettings {
         name: Some(sample.name.into()),
         size_mm: Some(painting.size_mm()),
         colour_space: Some(ColourSpace::Srgb),
@@ -34,7 +34,7 @@ pub fn write_sample(sample: &Sample, folder: &Path) -> Result<(), DocumentError>
             Finish::Metallic { .. } => Workflow::MetallicRoughness,
             Finish::Specular { .. } => Workflow::SpecularGlossiness,
         }),
-        ..Settings::default()
+        ..FolderSettings::default()
     };
     let path = folder.join(SETTINGS);
     let text = toml::to_string(&settings).map_err(|error| io(&path)(std::io::Error::other(error)))?;

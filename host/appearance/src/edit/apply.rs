@@ -85,7 +85,7 @@ pub fn apply(document: &Factored, steps: &[Step]) -> Result<Edited, EditError> {
     if document.space.angles().is_empty() {
         return Err(EditError::Tabulation);
     }
-    let mut work = Work::of(document);
+    let mut work = Work::new(document);
     for (number, step) in steps.iter().enumerate() {
         work.step = number;
         let refused = |source| EditError::Step { number: number + 1, source: Box::new(source) };
@@ -104,7 +104,7 @@ struct Work<'a> {
 }
 
 impl<'a> Work<'a> {
-    fn of(source: &'a Factored) -> Work<'a> {
+    fn new(source: &'a Factored) -> Work<'a> {
         let channels = source.maps.channels();
         let map =
             |channel: usize| source.maps.data().iter().skip(channel).step_by(channels).copied().collect();

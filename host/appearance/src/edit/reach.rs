@@ -9,7 +9,7 @@ use std::borrow::Cow;
 use observe::Silent;
 
 use crate::brdf::{Space, Table};
-use crate::gamut::{self, GamutError, Gloss, Intent, Printable, Settings};
+use crate::gamut::{self, GamutError, GamutSettings, Gloss, Intent, Printable};
 use crate::materials::Factored;
 use crate::weights::{ONE, WeightMaps};
 
@@ -25,11 +25,11 @@ pub fn reach(space: &Space, rows: &Table, printable: &Printable) -> Result<Vec<f
         return Ok(Vec::new());
     };
     let materials = Factored { space: space.clone(), bases: rows.clone(), maps };
-    let settings = Settings {
+    let settings = GamutSettings {
         intent: Intent::Basis,
         gloss: Gloss::Keep,
         most_cartridges: usize::MAX,
-        ..Settings::default()
+        ..GamutSettings::default()
     };
     let mapped = gamut::map(
         &materials,

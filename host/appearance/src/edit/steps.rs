@@ -27,10 +27,10 @@
 //! Files lie in the folder of the step file or below it; nothing else is read. Written steps stand by themselves: painted masks
 //! and curves lie beside them, as 16-bit pictures and CSV, and give the same document bit by bit.
 
-use std::io::BufWriter;
+use std::io::{BufWriter, Write as _};
 use std::path::{Component, Path, PathBuf};
 
-use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use image::ExtendedColorType;
 use observe::Observer;
 use serde::{Deserialize, Serialize};
 
@@ -234,11 +234,12 @@ impl Steps {
 
 fn write_mask(painted: &Painted, at: &Path) -> Result<(), DocumentError> {
     let io = |source| DocumentError::Io { path: at.to_path_buf(), attempt: "write", source };
-    let output = BufWriter::new(std::fs::File::create_new(at).map_err(io)?);
+    let mut output = std::fs::File::create_new(at).map_err(io)?;
     let greys: Vec<u8> = painted.values.iter().flat_map(|&w| to_grey(w).to_ne_bytes()).collect();
-    PngEncoder::new(output)
-        .write_image(&greys, painted.width as u32, painted.height as u32, ExtendedColorType::L16)
-        .map_err(|error| io(std::io::Error::other(error)))
+    let size = (painted.width as u32, painted.height as u32);
+    let picture = pictures::png(&greys, size, ExtendedColorType::L16)
+        .map_err(|error| io(std::io::Error::other(error)))?;
+    output.write_all(&picture).map_err(io)
 }
 
 /// A file in the folder or below it.

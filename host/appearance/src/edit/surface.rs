@@ -219,7 +219,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(16))]
+        #![proptest_config(testing::cases(16))]
         /// A tint is what a coloured base would have been in the first place: body of a dielectric, highlight of a metal.
         #[test]
         fn tints_multiply_the_base_colour(

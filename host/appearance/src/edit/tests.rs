@@ -98,7 +98,7 @@ fn written(edited: &Edited, steps: &Steps, folder: &Path) -> Vec<(String, Vec<u8
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
+    #![proptest_config(testing::cases(48))]
 
     /// Sums stay 1 (maps with other sums cannot be made), other pixels stay as they are, and every result is a reflectance.
     #[test]

@@ -331,7 +331,7 @@ mod tests {
     #[test]
     fn the_total_never_rises_and_bases_stay_within_the_slack() {
         let sample = Sample::draw(&noisy_mixtures(2500), 1).unwrap();
-        let pca = Pca::of(&sample, 10, 1);
+        let pca = Pca::fit(&sample, 10, 1);
         let hull = Hull::of_corners(&sample, &pca, 1);
         for delta in [0.0, 0.05, 0.5] {
             // A bad start: five neighbours in one corner.
@@ -356,7 +356,7 @@ mod tests {
     #[test]
     fn the_gradient_is_that_of_the_total() {
         let sample = Sample::draw(&noisy_mixtures(400), 2).unwrap();
-        let pca = Pca::of(&sample, 10, 1);
+        let pca = Pca::fit(&sample, 10, 1);
         let hull = Hull::of_corners(&sample, &pca, 1);
         let padded = sample.columns.padded;
         let mut fit = Fit::new(&sample, &hull, 0.0, &sample.x[..3 * padded]);

@@ -10,14 +10,14 @@ use super::error::FactorError;
 use super::hull::{self, Hull};
 use super::pca::Pca;
 use super::sample::Sample;
-use super::settings::{MOST_BASES, Method, Settings};
+use super::settings::{FactorSettings, MOST_BASES, Method};
 use super::{grow, kmeans, sacls, weigh};
 use crate::brdf::Table;
 use crate::materials::{Factored, Materials};
 
 /// How well the bases reproduce the document. Distances are in the metric (0.01: barely visible; 0.05: obvious).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Report {
+pub struct FactorReport {
     /// How bases were learnt.
     pub method: Method,
     /// Number of bases. Fewer than requested if the document has fewer materials.
@@ -40,7 +40,7 @@ pub struct Report {
     pub excursion: Vec<f64>,
 }
 
-impl fmt::Display for Report {
+impl fmt::Display for FactorReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
@@ -76,13 +76,13 @@ pub struct Factoring {
     /// Bases and weights.
     pub factored: Factored,
     /// How well they reproduce the document.
-    pub report: Report,
+    pub report: FactorReport,
 }
 
 /// Factors a document into bases and weight maps of the document's size, and measures how well they reproduce it.
 pub fn factor(
     document: &dyn Materials,
-    settings: &Settings,
+    settings: &FactorSettings,
     observer: &dyn Observer,
 ) -> Result<Factoring, FactorError> {
     check_size(document)?;
@@ -94,7 +94,7 @@ pub fn factor(
     let (maps, errors) = weigh::weigh(document, columns, &bases, observer)?;
     let mut table = Table::new(columns.real);
     bases.chunks_exact(columns.padded).for_each(|row| table.push(&columns.reflectance(row)));
-    let report = Report {
+    let report = FactorReport {
         method: settings.method,
         bases: table.len(),
         asked: settings.bases,
@@ -126,9 +126,9 @@ const SETTLED: f64 = 1e-3;
 const CORNER_AXES: usize = 10;
 
 /// Learns bases for a sample, as rows of its columns. Also returns its principal axes.
-fn learn(sample: &Sample, settings: &Settings, observer: &dyn Observer) -> (Pca, Vec<f32>) {
+fn learn(sample: &Sample, settings: &FactorSettings, observer: &dyn Observer) -> (Pca, Vec<f32>) {
     let axes = settings.bases.unwrap_or(grow::MOST).max(CORNER_AXES + 1) - 1;
-    let pca = Pca::of(sample, axes, settings.seed);
+    let pca = Pca::fit(sample, axes, settings.seed);
     let most = sample.len();
     if most == 1 || settings.bases.is_some_and(|k| k >= most) {
         return (pca, sample.x.clone());

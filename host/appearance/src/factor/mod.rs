@@ -29,7 +29,7 @@ mod tests;
 mod weigh;
 
 pub use error::FactorError;
-pub use factoring::{Factoring, Report, factor};
-pub use settings::{MOST_BASES, Method, Settings};
+pub use factoring::{FactorReport, Factoring, factor};
+pub use settings::{FactorSettings, MOST_BASES, Method};
 
 pub use crate::materials::Factored;

@@ -34,7 +34,7 @@ pub(super) struct Pca {
 
 impl Pca {
     /// The first `wanted` axes.
-    pub fn of(sample: &Sample, wanted: usize, seed: u64) -> Pca {
+    pub fn fit(sample: &Sample, wanted: usize, seed: u64) -> Pca {
         let padded = sample.columns.padded;
         let tangent: Vec<f64> = sample.columns.omega.iter().map(|&o| f64::from(o) / 3.0).collect();
         let mut mean = vec![0.0; padded];
@@ -243,7 +243,7 @@ mod tests {
             })
             .collect();
         let sample = Sample { t: x.clone(), x, weight: vec![1.0 / n as f64; n], columns };
-        let pca = Pca::of(&sample, 6, 1);
+        let pca = Pca::fit(&sample, 6, 1);
         assert_eq!(pca.dimensions, 2);
         let variance: f64 = pca.variance.iter().sum();
         assert!((variance.sqrt() / pca.spread - 1.0).abs() < 1e-6);

@@ -9,7 +9,7 @@
 //! often by more than its spread. Reconstruction is the best of all methods, but prints need not be.
 //! Source: Lawrence et al. 2006 for the problem; the growing penalty is new here.
 
-use crate::solve::{Gram, Lanes};
+use crate::solve::{Gram, SimplexBatch};
 
 use super::columns::{accumulate, dot, mix};
 use super::parts;
@@ -82,7 +82,7 @@ fn code(
     let mut some = vec![0.0; typical * k];
     some.chunks_exact_mut(k).enumerate().for_each(|(i, h)| products(i * sample.len() / typical, h));
     // Sizes agree and numbers are finite, so there is a solution, near that of the last round.
-    let lanes = Lanes::new(&gram, &some);
+    let lanes = SimplexBatch::new(&gram, &some);
     let partial = parts::each_mut(sample.len(), weights, k, |range, weights| {
         let mut matrix = vec![0.0f64; k * k];
         let mut right = vec![0.0f32; k * padded];

@@ -23,7 +23,7 @@ pub enum Method {
 /// The settings of factoring. The defaults suit every document.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Settings {
+pub struct FactorSettings {
     /// How the bases are learnt.
     pub method: Method,
     /// Number of bases, 1..=[`MOST_BASES`]; by default as many as the document needs (15 at most).
@@ -37,13 +37,13 @@ pub struct Settings {
     pub lambda: f64,
 }
 
-impl Default for Settings {
-    fn default() -> Settings {
-        Settings { method: Method::default(), bases: None, seed: 0, delta: 0.05, lambda: 0.02 }
+impl Default for FactorSettings {
+    fn default() -> FactorSettings {
+        FactorSettings { method: Method::default(), bases: None, seed: 0, delta: 0.05, lambda: 0.02 }
     }
 }
 
-impl Settings {
+impl FactorSettings {
     /// Checks that every setting is in its range.
     pub(super) fn check(&self) -> Result<(), FactorError> {
         let ranges = [

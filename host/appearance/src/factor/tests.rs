@@ -137,7 +137,7 @@ pub(super) fn noisy_mixtures(pixels: usize) -> impl Materials {
 }
 
 fn run(document: &dyn Materials, method: Method, bases: impl Into<Option<usize>>) -> Factoring {
-    let settings = Settings { method, bases: bases.into(), ..Settings::default() };
+    let settings = FactorSettings { method, bases: bases.into(), ..FactorSettings::default() };
     factor(document, &settings, &Silent).expect("the document is sound")
 }
 
@@ -243,7 +243,7 @@ fn another_seed_is_another_factoring_and_the_same_seed_the_same() {
     let space = Space::half_angle(12);
     let (document, _) = mixtures(&four(&space), &space, 3000, 6);
     let with = |seed| {
-        let settings = Settings { seed, bases: Some(3), ..Settings::default() };
+        let settings = FactorSettings { seed, bases: Some(3), ..FactorSettings::default() };
         factor(&document, &settings, &Silent).unwrap().factored
     };
     assert_eq!(with(1), with(1));
@@ -301,7 +301,7 @@ fn a_document_of_no_light_is_one_black_basis() {
 fn a_single_free_basis_is_the_mean_in_the_metric() {
     let space = Space::half_angle(16);
     let (document, _) = mixtures(&four(&space), &space, 800, 7);
-    let settings = Settings { bases: Some(1), delta: 10.0, ..Settings::default() };
+    let settings = FactorSettings { bases: Some(1), delta: 10.0, ..FactorSettings::default() };
     let found = factor(&document, &settings, &Silent).unwrap();
     let mean: Vec<f64> = (0..space.columns())
         .map(|j| {
@@ -345,7 +345,8 @@ fn a_stronger_penalty_gives_purer_pixels() {
     let space = Space::half_angle(16);
     let (document, _) = mixtures(&four(&space), &space, 1200, 10);
     let purity = |lambda| {
-        let settings = Settings { method: Method::Sacls, bases: Some(4), lambda, ..Settings::default() };
+        let settings =
+            FactorSettings { method: Method::Sacls, bases: Some(4), lambda, ..FactorSettings::default() };
         let maps = factor(&document, &settings, &Silent).unwrap().factored.maps;
         let dominant = maps.data().chunks_exact(4).map(|a| f64::from(*a.iter().max().unwrap()));
         dominant.sum::<f64>() / (1200.0 * f64::from(ONE))
@@ -378,27 +379,27 @@ fn invalid_documents_are_errors() {
     let space = Space::half_angle(4);
     let mut rows = vec![vec![0.1; space.columns()]; 6];
     let document = |rows: &Vec<Vec<f32>>| Rows { width: 3, space: space.clone(), rows: rows.clone() };
-    let fails = |document: &Rows, settings: Settings| factor(document, &settings, &Silent).unwrap_err();
+    let fails = |document: &Rows, settings: FactorSettings| factor(document, &settings, &Silent).unwrap_err();
     let empty = Rows { width: 3, space: space.clone(), rows: Vec::new() };
-    assert_eq!(fails(&empty, Settings::default()), FactorError::Size { width: 3, height: 0 });
+    assert_eq!(fails(&empty, FactorSettings::default()), FactorError::Size { width: 3, height: 0 });
     for (name, settings) in [
-        ("bases", Settings { bases: Some(0), ..Settings::default() }),
-        ("bases", Settings { bases: Some(33), ..Settings::default() }),
-        ("delta", Settings { delta: f64::NAN, ..Settings::default() }),
-        ("lambda", Settings { lambda: -1.0, ..Settings::default() }),
+        ("bases", FactorSettings { bases: Some(0), ..FactorSettings::default() }),
+        ("bases", FactorSettings { bases: Some(33), ..FactorSettings::default() }),
+        ("delta", FactorSettings { delta: f64::NAN, ..FactorSettings::default() }),
+        ("lambda", FactorSettings { lambda: -1.0, ..FactorSettings::default() }),
     ] {
         let error = fails(&document(&rows), settings);
         assert!(matches!(error, FactorError::Setting { name: n, .. } if n == name), "{error}");
     }
     for value in [f32::NAN, f32::INFINITY, 2e6] {
         rows[4][5] = value;
-        let error = fails(&document(&rows), Settings::default());
+        let error = fails(&document(&rows), FactorSettings::default());
         assert!(matches!(error, FactorError::Reflectance { x: 1, y: 1, column: 5, .. }), "{error}");
     }
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(testing::cases(24))]
     #[test]
     fn any_reflectances_factor_into_a_partition_of_unity(
         values in prop::collection::vec(prop_oneof![3 => 0.0f32..2.0, 1 => Just(0.0), 1 => 0.0f32..1e5], 12 * 9),
@@ -421,7 +422,7 @@ proptest! {
 fn on_real_materials_the_methods_rank_as_documented() {
     let Some(document) = Textures::open("helmet_metal", 6) else { return };
     let [archetypes, kmeans, sacls] = METHODS.map(|method| run(&document, method, 6).report);
-    let out = |report: &Report| report.excursion.iter().sum::<f64>() / report.bases as f64;
+    let out = |report: &FactorReport| report.excursion.iter().sum::<f64>() / report.bases as f64;
     assert!(archetypes.rmse < 0.8 * kmeans.rmse, "{} {}", archetypes.rmse, kmeans.rmse);
     assert!(sacls.rmse < 0.8 * kmeans.rmse, "{} {}", sacls.rmse, kmeans.rmse);
     assert!(out(&kmeans) < 1e-3, "means of real materials are inside: {:?}", kmeans.excursion);
@@ -433,7 +434,7 @@ fn on_real_materials_the_methods_rank_as_documented() {
 fn a_tighter_hull_costs_reconstruction() {
     let Some(document) = Textures::open("rustymetal", 16) else { return };
     let rmse = |delta| {
-        let settings = Settings { bases: Some(4), delta, ..Settings::default() };
+        let settings = FactorSettings { bases: Some(4), delta, ..FactorSettings::default() };
         factor(&document, &settings, &Silent).unwrap().report.rmse
     };
     let (none, some, much) = (rmse(0.0), rmse(0.05), rmse(0.2));

@@ -42,7 +42,7 @@ pub(super) fn weigh(
 ) -> Result<(WeightMaps, Errors), FactorError> {
     let (width, height) = (document.width(), document.height());
     let k = bases.len() / columns.padded;
-    let distinct = Distinct::of(document);
+    let distinct = Distinct::find(document);
     let mut data = vec![0u16; distinct.first().len() * k];
     let mut distance = vec![0.0f32; distinct.first().len()];
     observer.begin("computing weights", distance.len() as u64);

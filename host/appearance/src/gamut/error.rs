@@ -2,7 +2,7 @@
 
 use inks::Stack;
 
-use super::mix::MixError;
+use super::result::mix::MixError;
 use crate::solve::MixtureError;
 use crate::weights::WeightError;
 

@@ -6,16 +6,19 @@ use inks::{InkSet, Stack};
 use observe::Observer;
 use protocol::ink::Ink;
 
-use super::basis::Bases;
 use super::candidates::{Candidates, Printable};
-use super::cartridges::{Cartridges, Precision};
-use super::clamp::Clamped;
 use super::error::GamutError;
-use super::fitted::Targets;
-use super::gloss::FEW_MERGED;
-use super::report::{GivenUp, Judged, Mapped, PixelReport, Report};
-use super::settings::{Gloss, Intent, Settings};
-use super::{assemble, basis, blend, cartridges, choice, clamp, eye, local, sample, typical};
+use super::fitting::basis::Bases;
+use super::fitting::clamp::Clamped;
+use super::fitting::gloss::FEW_MERGED;
+use super::fitting::{basis, blend, clamp, local, spatial_average};
+use super::result::report::{GamutReport, GivenUp, Judged, Mapped, PixelReport};
+use super::result::{assemble, typical};
+use super::sample;
+use super::selection::cartridges::{Cartridges, Precision};
+use super::selection::fitted::Targets;
+use super::selection::{cartridges, stacks};
+use super::settings::{GamutSettings, Gloss, Intent};
 use crate::brdf::{Space, Table};
 use crate::materials::{Factored, Materials};
 use crate::solve::MixtureError;
@@ -40,7 +43,7 @@ pub fn map<'a, E: From<GamutError>>(
     pixels: &dyn Materials,
     factored: impl FnOnce() -> Result<Cow<'a, Factored>, E>,
     printable: &Printable,
-    settings: &Settings,
+    settings: &GamutSettings,
     observer: &dyn Observer,
 ) -> Result<Mapped, E> {
     let document = Pixels::new(pixels, printable, settings)?;
@@ -75,7 +78,7 @@ pub fn map<'a, E: From<GamutError>>(
 pub fn clamped(
     pixels: &dyn Materials,
     printable: &Printable,
-    settings: &Settings,
+    settings: &GamutSettings,
     observer: &dyn Observer,
 ) -> Result<Mapped, GamutError> {
     let document = Pixels::new(pixels, printable, settings)?;
@@ -104,7 +107,7 @@ pub fn gain(
     at_hand: &Printable,
     more: &Printable,
     space: &Space,
-    settings: &Settings,
+    settings: &GamutSettings,
 ) -> Result<Option<Gain>, GamutError> {
     check_stacks(more)?;
     let all = Candidates::new(space, more, settings.light).map_err(in_target("the stacks"))?;
@@ -143,10 +146,10 @@ pub struct Choice {
 pub fn choose(
     pixels: &dyn Materials,
     printable: &Printable,
-    settings: &Settings,
+    settings: &GamutSettings,
     observer: &dyn Observer,
 ) -> Result<Choice, GamutError> {
-    let settings = Settings { intent: Intent::Clamp, ..settings.clone() };
+    let settings = GamutSettings { intent: Intent::Clamp, ..settings.clone() };
     let document = Pixels::new(pixels, printable, &settings)?;
     let (targets, _) = document.targets(None)?;
     let all = &document.all;
@@ -163,7 +166,7 @@ pub fn choose(
 /// The pixels of a document, a sample of them, and the stacks.
 struct Pixels<'a> {
     pixels: &'a dyn Materials,
-    settings: &'a Settings,
+    settings: &'a GamutSettings,
     all: Candidates,
     sampled: Vec<usize>,
     sample: Table,
@@ -187,7 +190,7 @@ impl<'a> Pixels<'a> {
     fn new(
         pixels: &'a dyn Materials,
         printable: &Printable,
-        settings: &'a Settings,
+        settings: &'a GamutSettings,
     ) -> Result<Self, GamutError> {
         check_stacks(printable)?;
         let all =
@@ -237,7 +240,7 @@ impl<'a> Pixels<'a> {
         let (targets, rows) = self.targets(bases)?;
         let cartridges = self.cartridges(&targets, observer)?;
         let stacks =
-            choice::choose(&self.all, &cartridges.stacks, &targets).map_err(in_target("choosing stacks"))?;
+            stacks::choose(&self.all, &cartridges.stacks, &targets).map_err(in_target("choosing stacks"))?;
         let candidates = self.all.subset(&stacks);
         check_number(&candidates.stacks)?;
         let judged = Judged { rows, importance: targets.importance, distance: cartridges.chosen };
@@ -284,7 +287,13 @@ impl<'a> Pixels<'a> {
             }
             _ => {
                 if let Some(spot) = self.settings.eye {
-                    kept = eye::please(candidates, self.pixels, &mut clamped, spot, observer)?;
+                    kept = spatial_average::match_averages(
+                        candidates,
+                        self.pixels,
+                        &mut clamped,
+                        spot,
+                        observer,
+                    )?;
                 }
                 Intent::Clamp
             }
@@ -294,7 +303,7 @@ impl<'a> Pixels<'a> {
         self.mapped(
             chosen,
             mixed,
-            Report {
+            GamutReport {
                 intent,
                 cartridges: Vec::new(),
                 given_up: given_up.clone(),
@@ -318,7 +327,7 @@ impl<'a> Pixels<'a> {
         self.mapped(
             chosen,
             (bases.shares, document.maps.clone()),
-            Report {
+            GamutReport {
                 intent: Intent::Basis,
                 cartridges: Vec::new(),
                 given_up: chosen.given_up.clone(),
@@ -414,7 +423,7 @@ impl<'a> Pixels<'a> {
         self.mapped(
             chosen,
             mixed,
-            Report {
+            GamutReport {
                 intent: Intent::Blend,
                 cartridges: Vec::new(),
                 given_up: chosen.given_up.clone(),
@@ -457,7 +466,7 @@ impl<'a> Pixels<'a> {
         &self,
         Chosen { candidates, judged, .. }: &Chosen,
         (shares, maps): (Vec<Vec<u16>>, WeightMaps),
-        mut report: Report,
+        mut report: GamutReport,
     ) -> Result<Mapped, GamutError> {
         let (mix, curves) = assemble::assemble(candidates, shares, maps)?;
         if let Some(pixels) = &mut report.pixels {
@@ -486,7 +495,7 @@ fn in_target(what: impl Into<String>) -> impl FnOnce(MixtureError) -> GamutError
 }
 
 /// A sentence that names the inks that were left out and what that costs.
-fn in_words(cartridges: &Cartridges, settings: &Settings) -> Option<String> {
+fn in_words(cartridges: &Cartridges, settings: &GamutSettings) -> Option<String> {
     let names: Vec<&str> = cartridges.given_up.iter().map(|given_up| given_up.ink.name()).collect();
     let listed = match names.split_last()? {
         (last, []) => format!("{last} is"),

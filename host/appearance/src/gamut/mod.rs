@@ -10,38 +10,24 @@
 //! Cost: a millisecond per basis; 7 to 10 microseconds per pixel and core for clamp and blend, three times that for
 //! contrast. Limits: the mixture is exact only for light that does not scatter sideways in the paper.
 
-mod assemble;
-mod basis;
-mod blend;
 mod candidates;
-mod cartridges;
-mod choice;
-mod clamp;
-mod doubt;
 mod error;
-mod eye;
-pub mod files;
-mod fitted;
-mod gloss;
-mod local;
+mod fitting;
 mod map;
-mod mix;
-mod moved;
 mod prune;
-mod recent;
-mod redundancy;
-mod report;
+mod result;
 mod sample;
+mod selection;
 mod settings;
 #[cfg(test)]
 mod tests;
-mod typical;
 
 pub use candidates::Printable;
-pub use doubt::{Doubt, doubt};
 pub use error::GamutError;
 pub use map::{Choice, Gain, choose, clamped, gain, map};
-pub use mix::{InkMix, MixError};
-pub use redundancy::{LeftOut, redundancy};
-pub use report::{GivenUp, Judged, Mapped, MaterialReport, PixelReport, Report};
-pub use settings::{Gloss, Intent, LIGHT, Settings};
+pub use result::files;
+pub use result::mix::{InkMix, MixError};
+pub use result::report::{GamutReport, GivenUp, Judged, Mapped, MaterialReport, PixelReport};
+pub use result::uncertainty::{DistanceUncertainty, distance_uncertainty};
+pub use selection::redundancy::{LeftOut, redundancy};
+pub use settings::{GamutSettings, Gloss, Intent, LIGHT};

@@ -3,8 +3,8 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::gloss::{DIFFERENT, MERGED};
-use super::mix::InkMix;
+use super::fitting::gloss::{DIFFERENT, MERGED};
+use super::result::mix::InkMix;
 use crate::brdf::{Space, Table};
 use crate::materials::Materials;
 

@@ -45,7 +45,7 @@ pub enum Gloss {
 
 /// Settings of the gamut mapping.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
+pub struct GamutSettings {
     /// What to do with materials outside the gamut.
     pub intent: Intent,
     /// Mixtures are chosen by distance d and this times the distance in light ([`LIGHT`]), as sides of a right angle; 0 is
@@ -62,9 +62,9 @@ pub struct Settings {
     pub seed: u64,
 }
 
-impl Default for Settings {
-    fn default() -> Settings {
-        Settings {
+impl Default for GamutSettings {
+    fn default() -> GamutSettings {
+        GamutSettings {
             intent: Intent::Auto,
             light: LIGHT,
             eye: None,
@@ -75,7 +75,7 @@ impl Default for Settings {
     }
 }
 
-impl Settings {
+impl GamutSettings {
     /// What a difference in this metric counts, in words that follow "difference".
     pub fn measure(&self) -> &'static str {
         if self.light > 0.0 { ", light included," } else { " d" }

@@ -23,15 +23,15 @@ fn map(
     document: &Factored,
     materials: Option<&dyn Materials>,
     printable: &Printable,
-    settings: &Settings,
+    settings: &GamutSettings,
     observer: &Silent,
 ) -> Result<Mapped, GamutError> {
     let factored = || Ok(std::borrow::Cow::Borrowed(document));
     super::map(materials.unwrap_or(document), factored, printable, settings, observer)
 }
 
-fn basis_settings() -> Settings {
-    Settings { intent: Intent::Basis, ..Settings::default() }
+fn basis_settings() -> GamutSettings {
+    GamutSettings { intent: Intent::Basis, ..GamutSettings::default() }
 }
 
 fn maps(width: usize, height: usize, channels: usize, weight: impl Fn(usize, usize) -> f64) -> WeightMaps {
@@ -117,7 +117,7 @@ fn is_printable(mix: &InkMix, most: usize) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(testing::cases(24))]
 
     /// Convex combinations of convex combinations are convex combinations, in exact arithmetic.
     #[test]
@@ -159,7 +159,7 @@ proptest! {
         }
         let document = Factored { space: space.clone(), bases, maps: pattern(6, 5) };
         // All inks, so that none must be given up.
-        let settings = Settings { most_cartridges: 13, ..basis_settings() };
+        let settings = GamutSettings { most_cartridges: 13, ..basis_settings() };
         let mapped = map(&document, None, &printable, &settings, &Silent).unwrap();
         is_printable(&mapped.mix, 13);
         let mut target = vec![0f32; space.columns()];
@@ -183,7 +183,11 @@ fn ladder(space: &Space) -> (Printable, Vec<Curve>) {
 }
 
 /// The weight of the gloss coat in each pixel of a four-pixel image of the ladder.
-fn rungs(bases: &[usize], weight: impl Fn(usize, usize) -> f64, settings: &Settings) -> (Vec<f64>, Report) {
+fn rungs(
+    bases: &[usize],
+    weight: impl Fn(usize, usize) -> f64,
+    settings: &GamutSettings,
+) -> (Vec<f64>, GamutReport) {
     let space = space();
     let (printable, curves) = ladder(&space);
     let mut table = Table::new(space.columns());
@@ -215,7 +219,7 @@ fn the_ladder_stays_a_ladder_when_every_rung_is_a_basis() {
 
 #[test]
 fn without_scaling_the_upper_rungs_are_clamped_together() {
-    let settings = Settings { gloss: Gloss::Keep, ..basis_settings() };
+    let settings = GamutSettings { gloss: Gloss::Keep, ..basis_settings() };
     let (rungs, report) = rungs(&[0, 1, 2, 3], |p, c| f64::from(u8::from(p == c)), &settings);
     assert!(rungs[..3].iter().all(|r| *r > 0.99) && rungs[3] < 0.25, "{rungs:?}");
     assert_eq!(report.gloss_scale, None);
@@ -239,7 +243,7 @@ fn the_ladder_stays_a_ladder_when_its_ends_are_the_bases() {
 #[test]
 fn clamping_the_ladder_merges_it() {
     let weight = |p: usize, c: usize| f64::from(u8::from(p == c));
-    let clamp = Settings { intent: Intent::Clamp, ..Settings::default() };
+    let clamp = GamutSettings { intent: Intent::Clamp, ..GamutSettings::default() };
     let (clamped, report) = rungs(&[0, 1, 2, 3], weight, &clamp);
     assert!(clamped[..3].iter().all(|r| *r > 0.99), "{clamped:?}");
     assert!(report.pixels.unwrap().merged > 0.01);
@@ -255,7 +259,7 @@ fn the_automatic_choice_blends_where_that_keeps_materials_apart() {
     let document =
         document(&space, &stripes, maps(72, 8, 3, |pixel, c| f64::from(u8::from(stripe(pixel) == c))));
     let run = |intent| {
-        let settings = Settings { intent, ..Settings::default() };
+        let settings = GamutSettings { intent, ..GamutSettings::default() };
         map(&document, None, &printable, &settings, &Silent).unwrap()
     };
     let (auto, clamped) = (run(Intent::Auto), run(Intent::Clamp));
@@ -275,7 +279,7 @@ fn the_automatic_choice_clamps_where_a_blend_merges_as_many() {
     let one = document(&space, &surfaces[7..8], WeightMaps::uniform(8, 8));
     let pixels = Field { space: space.clone(), width: 8, surfaces };
     let run = |intent| {
-        let settings = Settings { intent, ..Settings::default() };
+        let settings = GamutSettings { intent, ..GamutSettings::default() };
         map(&one, Some(&pixels), &printable, &settings, &Silent).unwrap()
     };
     let (auto, clamped, blended) = (run(Intent::Auto), run(Intent::Clamp), run(Intent::Blend));
@@ -293,7 +297,7 @@ fn reported_distances_are_those_of_the_mix() {
     let pixels = field(&space, 20, 19);
     let document = document(&space, &four(), pattern(20, 19));
     for intent in [Intent::Clamp, Intent::Blend, Intent::Contrast] {
-        let settings = Settings { intent, ..Settings::default() };
+        let settings = GamutSettings { intent, ..GamutSettings::default() };
         let mapped = map(&document, Some(&pixels), &printable, &settings, &Silent).unwrap();
         let (mut distances, mut light) = (Vec::new(), 0.0);
         let mut row = vec![0f32; space.columns()];
@@ -325,7 +329,7 @@ fn the_gain_of_inks_is_judged_by_what_the_intent_maps() {
     let pixels = field(&space, 12, 10);
     let document = document(&space, &four(), pattern(12, 10));
     for intent in [Intent::Basis, Intent::Clamp, Intent::Blend] {
-        let settings = Settings { intent, gloss: Gloss::Keep, light: 0.0, ..Settings::default() };
+        let settings = GamutSettings { intent, gloss: Gloss::Keep, light: 0.0, ..GamutSettings::default() };
         let run = |printable| map(&document, Some(&pixels), printable, &settings, &Silent).unwrap();
         let (without, with) = (run(&few), run(&more));
         let gain = gain(&without.judged, &few, &more, &space, &settings).unwrap().unwrap();
@@ -384,7 +388,7 @@ fn fewer_cartridges_are_kept_to_and_cost_distance() {
     let document = document(&space, &surfaces, weights);
     let mut last = 0.0;
     for most in [13, 7, 5, 1, 0] {
-        let settings = Settings { most_cartridges: most, gloss: Gloss::Keep, ..basis_settings() };
+        let settings = GamutSettings { most_cartridges: most, gloss: Gloss::Keep, ..basis_settings() };
         let Mapped { mix, report, .. } = map(&document, None, &printable, &settings, &Silent).unwrap();
         is_printable(&mix, most);
         assert_eq!(report.cartridges, mix.inks());
@@ -406,7 +410,7 @@ fn no_cartridge_and_no_substrate_is_an_error() {
     printable.curves.rows().skip(1).for_each(|row| curves.push(row));
     printable.curves = curves;
     let document = document(&space, &four(), pattern(4, 4));
-    let settings = Settings { most_cartridges: 0, ..basis_settings() };
+    let settings = GamutSettings { most_cartridges: 0, ..basis_settings() };
     let error = map(&document, None, &printable, &settings, &Silent).unwrap_err();
     assert_eq!(error, GamutError::Cartridges { most: 0 });
     // With cartridges it works, and the substrate is listed first all the same.
@@ -435,7 +439,7 @@ fn every_clamped_pixel_is_its_own_best() {
     let printable = Printable::new(stacks, curves);
     let pixels = field(&space, 20, 19);
     let document = document(&space, &four(), pattern(20, 19));
-    let settings = Settings { intent: Intent::Clamp, most_cartridges: 13, ..Settings::default() };
+    let settings = GamutSettings { intent: Intent::Clamp, most_cartridges: 13, ..GamutSettings::default() };
     let mapped = map(&document, Some(&pixels), &printable, &settings, &Silent).unwrap();
     is_printable(&mapped.mix, 13);
     let hull = crate::solve::Hull::new(&space, &printable.curves, &[0.0; 57], LIGHT).unwrap();
@@ -464,7 +468,7 @@ fn mapping_is_the_same_with_any_number_of_threads() {
     let document = document(&space, &four(), pattern(40, 50));
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let settings = Settings { intent: Intent::Blend, ..Settings::default() };
+        let settings = GamutSettings { intent: Intent::Blend, ..GamutSettings::default() };
         pool.install(|| map(&document, Some(&pixels), &printable, &settings, &Silent).unwrap())
     };
     let one = run(1);
@@ -481,7 +485,8 @@ fn blending_follows_the_clamped_mix_inside_the_gamut() {
     let pixels = Field { space: space.clone(), width: 24, surfaces: vec![inside; 24 * 24] };
     let document = document(&space, &four(), pattern(24, 24));
     let run = |intent| {
-        let settings = Settings { intent, gloss: Gloss::Keep, most_cartridges: 13, ..Settings::default() };
+        let settings =
+            GamutSettings { intent, gloss: Gloss::Keep, most_cartridges: 13, ..GamutSettings::default() };
         map(&document, Some(&pixels), &printable, &settings, &Silent).unwrap()
     };
     let (clamped, blended) = (run(Intent::Clamp), run(Intent::Blend));
@@ -498,7 +503,7 @@ fn inconsistent_inputs_are_errors() {
     let printable = everything(&space);
     let document = document(&space, &four(), pattern(4, 4));
     let fails = |document: &Factored, materials: Option<&dyn Materials>, printable: &Printable| {
-        let settings = Settings { intent: Intent::Blend, ..Settings::default() };
+        let settings = GamutSettings { intent: Intent::Blend, ..GamutSettings::default() };
         map(document, materials, printable, &settings, &Silent).unwrap_err()
     };
     let none = Printable::new(vec![], Table::new(space.columns()));

@@ -27,7 +27,7 @@ pub(crate) struct Distinct {
 
 impl Distinct {
     /// Finds the distinct materials. The document must have fewer than 2^32 pixels.
-    pub fn of(materials: &dyn Materials) -> Distinct {
+    pub fn find(materials: &dyn Materials) -> Distinct {
         let (pixels, columns) = (materials.width() * materials.height(), materials.space().columns());
         let mut hashes = vec![0u64; pixels];
         hashes.par_chunks_mut(RUN).enumerate().for_each(|(run, hashes)| {
@@ -146,7 +146,7 @@ mod tests {
     proptest! {
         #[test]
         fn pixels_share_a_number_exactly_when_they_are_equal(names in prop::collection::vec(0u8..20, 1..200)) {
-            let distinct = Distinct::of(&Named(names.clone(), Space::half_angle(2)));
+            let distinct = Distinct::find(&Named(names.clone(), Space::half_angle(2)));
             for (a, &class_a) in names.iter().zip(distinct.class()) {
                 prop_assert_eq!(names[distinct.first()[class_a as usize] as usize], *a);
                 for (b, &class_b) in names.iter().zip(distinct.class()) {

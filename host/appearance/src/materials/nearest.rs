@@ -107,14 +107,14 @@ impl Nearest {
     /// Base colour and metalness: those whose luminances of body and highlight are these, with what remains of the
     /// highlight beside a dielectric's own in the base colour.
     pub fn metallic(&self) -> Metallic {
-        Metallic::of(&self.diffuse, &self.f0)
+        Metallic::from_colours(&self.diffuse, &self.f0)
     }
 }
 
 impl Near {
     /// Base colour and metalness, as of [`Nearest::metallic`].
     pub fn metallic(&self) -> Metallic {
-        Metallic::of(&self.diffuse, &self.f0)
+        Metallic::from_colours(&self.diffuse, &self.f0)
     }
 
     /// The same width with the body and highlight of a base colour.
@@ -129,7 +129,7 @@ impl Near {
 }
 
 impl Metallic {
-    fn of(diffuse: &[f64; 3], f0: &[f64; 3]) -> Metallic {
+    fn from_colours(diffuse: &[f64; 3], f0: &[f64; 3]) -> Metallic {
         let [body, shine] = [diffuse, f0].map(|c| 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]);
         // diffuse = base (1 - m) (1 - q) and f0 = q (1 - m) + base m are q m^2 + b m + (q - shine) = 0.
         let q = DIELECTRIC;
@@ -243,7 +243,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(24))]
+        #![proptest_config(testing::cases(24))]
         /// A surface of the workflow comes back from its curve, and so do its base colour and metalness.
         #[test]
         fn surfaces_come_back_from_their_curves(
@@ -272,7 +272,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(24))]
+        #![proptest_config(testing::cases(24))]
         /// Among prepared widths is one nearly as good as the best of all, for two surfaces side by side, too.
         #[test]
         fn prepared_widths_are_nearly_as_good(

@@ -179,7 +179,7 @@ mod tests {
                 }
             }
             // Pixels with one number reflect the same, bit for bit.
-            let distinct = Distinct::of(&reduced);
+            let distinct = Distinct::find(&reduced);
             for (cell, &class) in distinct.class().iter().enumerate() {
                 reduced.reflectance(cell, &mut row);
                 reduced.reflectance(distinct.first()[class as usize] as usize, &mut found);
@@ -224,7 +224,7 @@ mod tests {
     #[test]
     fn a_field_of_one_material_stays_one() {
         let document = surfaces(50, 40, 0, 1);
-        let distinct = Distinct::of(&Reduced::new(&document, (17, 13)));
+        let distinct = Distinct::find(&Reduced::new(&document, (17, 13)));
         assert_eq!(distinct.first(), [0]);
     }
 }

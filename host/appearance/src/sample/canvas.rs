@@ -148,17 +148,17 @@ pub fn bezier(p: [Point; 4], s: f32) -> Point {
 }
 
 /// Signed distances to strokes and fills, correct within `reach` pixels of them.
-pub struct Shape {
+pub struct DistanceField {
     width: usize,
     height: usize,
     reach: f32,
     distance: Vec<f32>,
 }
 
-impl Shape {
+impl DistanceField {
     /// An empty shape; distances are limited to `reach`.
-    pub fn new(width: usize, height: usize, reach: f32) -> Shape {
-        Shape { width, height, reach, distance: vec![reach; width * height] }
+    pub fn new(width: usize, height: usize, reach: f32) -> DistanceField {
+        DistanceField { width, height, reach, distance: vec![reach; width * height] }
     }
 
     /// The signed distance at a pixel.
@@ -203,7 +203,7 @@ impl Shape {
     /// A closed outline, filled by the even-odd rule.
     pub fn fill(&mut self, outline: &[Point]) {
         let n = outline.len();
-        let mut rim = Shape::new(self.width, self.height, self.reach);
+        let mut rim = DistanceField::new(self.width, self.height, self.reach);
         for i in 0..n {
             rim.stroke(outline[i], outline[(i + 1) % n], 0.0, 0.0);
         }

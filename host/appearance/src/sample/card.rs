@@ -2,14 +2,14 @@
 
 use std::f32::consts::TAU;
 
-use super::canvas::{Coat, Point, Shape, bezier, clouds, hash, inside, mix, noise, paint, smooth};
+use super::canvas::{Coat, DistanceField, Point, bezier, clouds, hash, inside, mix, noise, paint, smooth};
 use super::painting::Painting;
 
 const WIDTH: usize = 1024;
 const HEIGHT: usize = 1443;
 
 /// A pen stroke with a broad nib held at 40 degrees: thin along the nib, wide across it.
-fn pen(shape: &mut Shape, strokes: &[[Point; 4]], at: Point, scale: f32, thin: f32, wide: f32) {
+fn pen(shape: &mut DistanceField, strokes: &[[Point; 4]], at: Point, scale: f32, thin: f32, wide: f32) {
     for stroke in strokes {
         let curve = stroke.map(|p| [at[0] + scale * p[0], at[1] + scale * p[1]]);
         let points: Vec<Point> = (0..=36).map(|k| bezier(curve, k as f32 / 36.0)).collect();
@@ -50,7 +50,7 @@ const FLOURISH: [[Point; 4]; 5] = [
 ];
 
 /// A leaf of holly: its outline between seven spines, and its middle vein.
-fn holly(leaves: &mut Shape, veins: &mut Shape, base: Point, degrees: f32, length: f32) {
+fn holly(leaves: &mut DistanceField, veins: &mut DistanceField, base: Point, degrees: f32, length: f32) {
     let (s, c) = degrees.to_radians().sin_cos();
     let place = |x: f32, y: f32| [base[0] + length * (c * x - s * y), base[1] + length * (s * x + c * y)];
     const SPINES: [Point; 5] = [[0.0, 0.02], [0.18, 0.21], [0.45, 0.30], [0.74, 0.24], [1.0, 0.0]];
@@ -79,7 +79,7 @@ fn holly(leaves: &mut Shape, veins: &mut Shape, base: Point, degrees: f32, lengt
 }
 
 /// A star of six arms with side arms, as a snow crystal.
-fn star(shape: &mut Shape, centre: Point, radius: f32, turn: f32) {
+fn star(shape: &mut DistanceField, centre: Point, radius: f32, turn: f32) {
     for arm in 0..6 {
         let angle = turn + TAU * arm as f32 / 6.0;
         let toward = |angle: f32, from: Point, length: f32| {
@@ -97,9 +97,9 @@ fn star(shape: &mut Shape, centre: Point, radius: f32, turn: f32) {
 }
 
 /// The word, the border and its flourishes.
-fn gilding() -> Shape {
+fn gilding() -> DistanceField {
     let (width, height) = (WIDTH as f32, HEIGHT as f32);
-    let mut gold = Shape::new(WIDTH, HEIGHT, 6.0);
+    let mut gold = DistanceField::new(WIDTH, HEIGHT, 6.0);
     pen(&mut gold, &WORD, [268.0, 560.0], 142.0, 2.6, 13.0);
     for (inset, radius) in [(46.0, 3.4), (62.0, 1.4)] {
         let corners = [
@@ -121,9 +121,9 @@ fn gilding() -> Shape {
 }
 
 /// Stars and dots.
-fn sky() -> Shape {
+fn sky() -> DistanceField {
     let width = WIDTH as f32;
-    let mut silver = Shape::new(WIDTH, HEIGHT, 4.0);
+    let mut silver = DistanceField::new(WIDTH, HEIGHT, 4.0);
     let stars = [
         ([268.0, 300.0], 74.0),
         ([724.0, 290.0], 96.0),
@@ -149,9 +149,10 @@ fn sky() -> Shape {
 }
 
 /// The leaves and their veins in layers, the lowest first, with a pair of leaves in each.
-fn sprig() -> [(Shape, Shape); 3] {
+fn sprig() -> [(DistanceField, DistanceField); 3] {
     [(-62.0, 190.0), (-20.0, 310.0), (14.0, 262.0)].map(|(degrees, length)| {
-        let (mut leaves, mut veins) = (Shape::new(WIDTH, HEIGHT, 26.0), Shape::new(WIDTH, HEIGHT, 4.0));
+        let (mut leaves, mut veins) =
+            (DistanceField::new(WIDTH, HEIGHT, 26.0), DistanceField::new(WIDTH, HEIGHT, 4.0));
         holly(&mut leaves, &mut veins, [530.0, 1200.0], degrees, length);
         holly(&mut leaves, &mut veins, [494.0, 1200.0], 180.0 - degrees, length);
         (leaves, veins)

@@ -1,6 +1,6 @@
 //! A dove in silver with a glossy olive twig, on matte blue.
 
-use super::canvas::{Coat, Point, Shape, bezier, clouds, inside, mix, noise, paint, smooth};
+use super::canvas::{Coat, DistanceField, Point, bezier, clouds, inside, mix, noise, paint, smooth};
 use super::painting::Painting;
 
 const WIDTH: usize = 1280;
@@ -65,7 +65,7 @@ const FAR: Wing = Wing {
 
 impl Wing {
     /// Draws the feathers into one shape and their shafts and gaps into another.
-    fn draw(&self, shape: &mut Shape, lines: &mut Shape, coverts: &mut Shape) {
+    fn draw(&self, shape: &mut DistanceField, lines: &mut DistanceField, coverts: &mut DistanceField) {
         let arm = [
             self.shoulder,
             [mix(self.shoulder[0], self.wrist[0], 0.4), mix(self.shoulder[1], self.wrist[1], 0.4)],
@@ -96,7 +96,7 @@ impl Wing {
 }
 
 /// A twig from the beak with its leaves.
-fn twig(stem: &mut Shape, leaves: &mut Shape, veins: &mut Shape) {
+fn twig(stem: &mut DistanceField, leaves: &mut DistanceField, veins: &mut DistanceField) {
     let curve = [[926.0, 402.0], [985.0, 430.0], [1030.0, 490.0], [1056.0, 580.0]].map(dropped);
     let points: Vec<Point> = (0..=20).map(|k| bezier(curve, k as f32 / 20.0)).collect();
     stem.line(&points, |s| mix(4.2, 2.0, s));
@@ -126,7 +126,7 @@ fn twig(stem: &mut Shape, leaves: &mut Shape, veins: &mut Shape) {
 
 /// Draws the dove.
 pub fn draw() -> Painting {
-    let shape = |reach| Shape::new(WIDTH, HEIGHT, reach);
+    let shape = |reach| DistanceField::new(WIDTH, HEIGHT, reach);
     let (mut body, mut near, mut far) = (shape(40.0), shape(40.0), shape(40.0));
     let (mut shafts, mut far_shafts) = (shape(14.0), shape(14.0));
     let (mut coverts, mut far_coverts) = (shape(40.0), shape(40.0));

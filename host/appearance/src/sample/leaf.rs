@@ -4,8 +4,8 @@
 //! lobes and bays are round. Finer veins branch off the veins of the lobes and bend toward the tip.
 
 use super::canvas::{
-    Coarse, Coat, Point, Shape, bezier, blend, capsule, cells, clouds, colour, hash, inside, mix, mix3,
-    paint, smooth,
+    Coarse, Coat, DistanceField, Point, bezier, blend, capsule, cells, clouds, colour, hash, inside, mix,
+    mix3, paint, smooth,
 };
 use super::painting::Painting;
 
@@ -114,7 +114,7 @@ fn outline(p: Point, veins: &[(Vec<Point>, f32)], body: &[(Point, f32)]) -> f32 
 
 /// The finer veins of one vein: to both sides, shorter towards its end, each with finer ones of its own.
 fn branches(
-    shape: &mut Shape,
+    shape: &mut DistanceField,
     parent: &[Point],
     reach: f32,
     count: usize,
@@ -163,13 +163,13 @@ pub fn draw() -> Painting {
         .collect();
     let blade = Coarse::sample(WIDTH, HEIGHT, 4, |p| outline(p, &veins, &body));
 
-    let mut silver = Shape::new(WIDTH, HEIGHT, 16.0);
+    let mut silver = DistanceField::new(WIDTH, HEIGHT, 16.0);
     let stalk: Vec<Point> = (0..=40).map(|k| bezier(MIDRIB, k as f32 / 40.0)).collect();
     silver.line(&stalk, |u| mix(9.0, 1.6, u.powf(0.7)));
     for (points, _) in &veins {
         silver.line(points, |u| mix(4.6, 1.3, u));
     }
-    let mut fine = Shape::new(WIDTH, HEIGHT, 5.0);
+    let mut fine = DistanceField::new(WIDTH, HEIGHT, 5.0);
     for (i, (points, radius)) in veins.iter().enumerate() {
         let length: f32 = points.windows(2).map(|p| (p[1][0] - p[0][0]).hypot(p[1][1] - p[0][1])).sum();
         let count = (length / 46.0) as usize + 1;

@@ -54,7 +54,7 @@ pub enum SimplexError {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Place {
+enum SupportStatus {
     Out,
     /// On the support.
     In,
@@ -69,7 +69,7 @@ pub struct Simplex {
     support: Vec<usize>,
     /// Points whose row of the factor is out of date, last first.
     pending: Vec<usize>,
-    place: Vec<Place>,
+    place: Vec<SupportStatus>,
     refused: Vec<usize>,
     /// Lower Cholesky factor of the shifted Gram matrix on the support, rows `n` apart, diagonal inverted.
     factor: Vec<f64>,
@@ -170,7 +170,7 @@ impl Simplex {
             (self.n, self.edition) = (n, 0);
             self.support.clear();
         }
-        self.place.resize(n, Place::Out);
+        self.place.resize(n, SupportStatus::Out);
         self.gradient.resize(n, 0.0);
         self.ones.resize(n, 0.0);
         self.step.resize(n, 0.0);
@@ -195,7 +195,7 @@ impl Simplex {
                 let (length, blocked) = self.step_on_support(gram, g, a);
                 if length > 0.0 {
                     while let Some(k) = self.refused.pop() {
-                        self.place[k] = Place::Out;
+                        self.place[k] = SupportStatus::Out;
                     }
                 }
                 if blocked {
@@ -218,7 +218,7 @@ impl Simplex {
             let mut joining = None;
             let mut least = level - tolerance;
             for (k, &slope) in g.iter().enumerate() {
-                if slope < least && self.place[k] == Place::Out {
+                if slope < least && self.place[k] == SupportStatus::Out {
                     (joining, least) = (Some(k), slope);
                 }
             }
@@ -237,20 +237,20 @@ impl Simplex {
     /// Keeps point `k` from joining until the weights have moved.
     #[inline(always)]
     fn refuse(&mut self, k: usize) {
-        self.place[k] = Place::Refused;
+        self.place[k] = SupportStatus::Refused;
         self.refused.push(k);
     }
 
     /// Makes the points with weight the support. Neighbouring pixels often have the same support; then its factor is kept.
     #[inline(always)]
     fn take_support(&mut self, gram: &Gram, g: &mut [f64], a: &mut [f64]) {
-        self.place.fill(Place::Out);
+        self.place.fill(SupportStatus::Out);
         self.refused.clear();
         let same = self.edition == gram.edition()
             && self.support.iter().all(|&k| a[k] > 0.0)
             && a.iter().filter(|&&a| a > 0.0).count() == self.support.len();
         if same {
-            self.support.iter().for_each(|&k| self.place[k] = Place::In);
+            self.support.iter().for_each(|&k| self.place[k] = SupportStatus::In);
             return;
         }
         (self.edition, self.n) = (gram.edition(), gram.len());
@@ -301,7 +301,7 @@ impl Simplex {
         while let Some(i) = self.support.iter().rposition(|&k| a[k] <= 0.0) {
             let k = self.support[i];
             a[k] = 0.0;
-            self.place[k] = Place::Out;
+            self.place[k] = SupportStatus::Out;
             self.leave(i);
         }
         self.join_pending(gram, g, a);
@@ -314,7 +314,7 @@ impl Simplex {
     fn join(&mut self, gram: &Gram, g: &mut [f64], a: &mut [f64], k: usize) -> bool {
         self.pending.push(k);
         self.join_pending(gram, g, a);
-        self.place[k] == Place::In
+        self.place[k] == SupportStatus::In
     }
 
     /// Adds the pending points to the support, the last first. This ends, because every exchange removes a point from both
@@ -325,12 +325,12 @@ impl Simplex {
             let p = self.support.len();
             self.support.push(k);
             if self.factor_row(gram, p) {
-                self.place[k] = Place::In;
+                self.place[k] = SupportStatus::In;
                 continue;
             }
             let gone = self.exchange(gram, g, a);
             a[self.support[gone]] = 0.0;
-            self.place[self.support[gone]] = Place::Out;
+            self.place[self.support[gone]] = SupportStatus::Out;
             self.leave(gone);
         }
     }

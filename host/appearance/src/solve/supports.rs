@@ -59,7 +59,7 @@ impl Supports {
     }
 
     /// The number of the support with these points, in ascending order; `None` if it has no factor.
-    pub fn of(&mut self, gram: &Gram, points: Vec<u32>) -> Option<u32> {
+    pub fn index_of(&mut self, gram: &Gram, points: Vec<u32>) -> Option<u32> {
         let number = match self.known.get(&points) {
             Some(&number) => number,
             None => {
@@ -87,7 +87,7 @@ impl Supports {
                 Ok(i) => _ = points.remove(i),
                 Err(i) => points.insert(i, k),
             }
-            next = self.of(gram, points).unwrap_or(NONE);
+            next = self.index_of(gram, points).unwrap_or(NONE);
             self.all[number as usize].next[k as usize] = next;
         }
         (next != NONE).then_some(next)

@@ -12,7 +12,7 @@ use std::time::Duration;
 use protocol::link::message::Ask;
 
 use crate::printers::{Printer, Printers, PrintersError, Standing};
-use crate::send::query::{Query, QueryError, Reply};
+use crate::questions::query::{Query, QueryError, Reply};
 
 /// Why a printer could not be asked.
 #[derive(Debug, thiserror::Error)]

@@ -8,12 +8,15 @@ use protocol::link::message::{Fault, JobKind, Progress};
 
 use super::ask::{self, Negotiate};
 use super::{Cartridges, Delivery, Ended, Failure, Job, News, Packed, Question, ResetOwed, number};
+use crate::connection::Bridge;
+use crate::connection::{Address, find};
+use crate::forms::{self, Content, streams};
 use crate::printers::{Printer, Printers, PrintersError, Standing};
-use crate::send::finish::{self, Sheet, await_sheet};
-use crate::send::journal::{Journal, JournalError, OpenJob};
-use crate::send::query::{Query, Reply, is_alps};
-use crate::send::session::{Bridge, Outcome, Phase, Record, Session, SessionError};
-use crate::send::{self, Address, Event, RunError, Wish, find, streams};
+use crate::questions::query::{Query, Reply, is_alps};
+use crate::transit::finish::{self, Sheet, await_sheet};
+use crate::transit::journal::{Journal, JournalError, OpenJob};
+use crate::transit::session::{Outcome, Phase, Record, Session, SessionError};
+use crate::transit::{self, Event, RunError, Wish};
 use observe::with_causes;
 
 /// How long a bridge may take to answer.
@@ -223,15 +226,15 @@ impl Delivery<'_> {
         };
         let checked = expanded
             .map_err(|error| error.to_string())
-            .and_then(|()| send::check(&bytes, self.caller.observer()).map_err(|error| error.to_string()));
+            .and_then(|()| forms::check(&bytes, self.caller.observer()).map_err(|error| error.to_string()));
         let (name, to) = (&old.entry.name, old.entry.to.parse());
         let (Ok(checked), Ok(to)) = (checked, to) else {
             // It was checked when it was queued, and its checksum has been compared.
             return Err(JournalError::NoSuchJob(old.entry.record.job).into());
         };
-        let job = Job { name, bytes: &bytes, checked: &checked };
+        let job = Job { name, content: Content::Bytes(&bytes), checked: &checked };
         let packed = if kind == JobKind::Raw {
-            Packed { job, kind, data: job.bytes.into() }
+            Packed { job, kind, data: job.content.bytes().into() }
         } else {
             Packed { job, kind, data: data.into() }
         };
@@ -273,7 +276,7 @@ impl Delivery<'_> {
         self.caller.tell(&News::Sending(&job.entry));
         let watcher = Watcher { delivery: self, job: number(&job.entry), ..Watcher::new(self) };
         watcher.serial.set(bridge);
-        let result = send::run_at(
+        let result = transit::run_at(
             &mut session,
             address,
             &mut |record| {

@@ -1,9 +1,9 @@
 //! The one way to a printer, for every command, the print queue, and whatever comes.
 //!
 //! Problem: a job has to be printed once, as a whole, at a printer that is ready for it, and counted; whoever sends it, and
-//! whatever crashes meanwhile. The steps are the same for all senders: [journal](crate::send::journal), the reset the printer
+//! whatever crashes meanwhile. The steps are the same for all senders: [journal](crate::transit::journal), the reset the printer
 //! may [need](crate::printers), what the device says it is, pass streams where the bridge makes the same bytes of them,
-//! the [session](crate::send::session), the [`ledger`], waiting for the sheet.
+//! the [session](crate::transit::session), the [`ledger`], waiting for the sheet.
 //! Method: a [`Delivery`] does these steps. A [`Caller`] is told what happens, and decides what only a person or a rule can: a
 //! terminal asks, a queue holds the job, a script fails. A job passes through three states that are never mixed:
 //! *queued* (on disk, [`Delivery::queue`]), *sent* (every byte has crossed the port, [`Delivery::send`]) and *printed* (the
@@ -11,9 +11,9 @@
 //! Before the first byte of a job leaves, the delivery asks whether the printer holds part of another one. The bridge's own
 //! answer decides where it can; if the bridge has forgotten, the caller has to agree to a reset. The answer holds for one
 //! start of the bridge: if it restarts between question and first byte, the question is asked again.
-//! Cost: the bytes of a job are parsed once to [check](crate::send::check) that they are one whole legal job, because anything
-//! else wastes a sheet; then [`streams`] reads them twice for their planes and expands the code once, because a bridge
-//! must make exactly these bytes. Nothing is parsed again when a job is resumed: its checksum is compared. Only a job that a bridge
+//! Cost: the bytes of a job are parsed once to [check](crate::forms::check) that they are one whole legal job, because anything
+//! else wastes a sheet. Then [`streams`] codes its planes, which it reads back from bytes that come from elsewhere, and expands
+//! the code once, because a bridge must make exactly these bytes. Nothing is parsed again when a job is resumed: its checksum is compared. Only a job that a bridge
 //! refuses as pass streams is checked once more, as the ledger needs its passes.
 //! Limits: a raw device tells nothing, so nothing can be resumed there. A computer that shares a bridge with another one over the
 //! network knows only its own jobs; the bridge knows how the last sixteen have ended.
@@ -29,15 +29,17 @@ use std::borrow::Cow;
 use protocol::ink::Ink;
 use protocol::link::message::{JobKind, Progress};
 
+use crate::connection::{Address, OpenError};
+use crate::forms::{Checked, Content, streams};
 use crate::ledger::{self, Ledger, PassUse};
 use crate::printers::{Printer, Printers, PrintersError};
-use crate::send::cartridges::{self, Found};
-use crate::send::journal::{Entry, Journal, JournalError, NewJob, OpenJob};
-use crate::send::query::{QueryError, Reply};
-use crate::send::raw::RawError;
-use crate::send::session::{Outcome, SessionError};
-use crate::send::status::Status;
-use crate::send::{Address, Checked, Event, OpenError, Wish, streams, words};
+use crate::questions::cartridges::{self, Found};
+use crate::questions::query::{QueryError, Reply};
+use crate::questions::status::Status;
+use crate::transit::journal::{Entry, Journal, JournalError, NewJob, OpenJob};
+use crate::transit::raw::RawError;
+use crate::transit::session::{Outcome, SessionError};
+use crate::transit::{Event, Wish, words};
 use observe::{Observer, with_causes};
 
 use ask::AskError;
@@ -269,9 +271,9 @@ impl Cartridges {
 pub struct Job<'a> {
     /// What people call it.
     pub name: &'a str,
-    /// Its bytes at the port.
-    pub bytes: &'a [u8],
-    /// What the [check](crate::send::check) found.
+    /// What is sent.
+    pub content: Content<'a>,
+    /// What the [check](crate::forms::check) found.
     pub checked: &'a Checked,
 }
 
@@ -285,9 +287,10 @@ pub struct Packed<'a> {
 impl<'a> Packed<'a> {
     /// Codes the job, if that gains anything.
     pub fn new(job: Job<'a>, observer: &dyn Observer) -> Packed<'a> {
-        match streams::of_job(job.bytes, observer).filter(|streams| streams.len() < job.bytes.len()) {
+        let (content, bytes) = (job.content, job.content.bytes());
+        match streams::of(content, observer).filter(|streams| streams.len() < bytes.len()) {
             Some(streams) => Packed { job, kind: JobKind::Streams, data: streams.into() },
-            None => Packed { job, kind: JobKind::Raw, data: job.bytes.into() },
+            None => Packed { job, kind: JobKind::Raw, data: bytes.into() },
         }
     }
 
@@ -354,10 +357,10 @@ impl<'a> Delivery<'a> {
             to: to.to_string(),
             kind: *kind,
             data,
-            port_bytes: job.bytes.len() as u64,
+            port_bytes: job.content.bytes().len() as u64,
             passes: job.checked.passes.clone(),
         })?;
-        self.count(&number(&queued.entry), job.checked, job.bytes.len() as u64);
+        self.count(&number(&queued.entry), job.checked, job.content.bytes().len() as u64);
         self.caller.tell(&News::Queued { entry: &queued.entry, data: data.len() as u64 });
         Ok(queued)
     }

@@ -7,8 +7,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::{Delivery, Failure, Job, News, Question, ResetOwed};
 use crate::printers::Printer;
-use crate::send::Wish;
-use crate::send::raw::{self, RawError};
+use crate::transit::Wish;
+use crate::transit::raw::{self, RawError};
 
 impl Delivery<'_> {
     /// Sends a job to a device. False if the caller ended it early, so that the sheet comes out unfinished and the printer is ready
@@ -37,9 +37,9 @@ impl Delivery<'_> {
         let number = format!("raw-{}-{}", moment.as_nanos(), std::process::id());
         self.caller.tell(&News::SendingRaw);
         self.printers.begin(&printer, &number, None)?;
-        self.count(&number, job.checked, job.bytes.len() as u64);
+        self.count(&number, job.checked, job.content.bytes().len() as u64);
         let stop = || self.caller.wish() != Wish::GoOn;
-        let sent = raw::send_while(job.bytes, device, self.caller.observer(), &stop);
+        let sent = raw::send_while(job.content.bytes(), device, self.caller.observer(), &stop);
         let (taken, whole) = match &sent {
             Ok(sent) => (sent.taken, sent.whole),
             Err(RawError::Write { taken, .. }) => (*taken, false),

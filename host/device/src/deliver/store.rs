@@ -1,7 +1,7 @@
 //! A job into a bridge's flash, to be printed there without this computer.
 //!
 //! Nothing is kept on disk here, since nothing is printed: a job that does not arrive as a whole does not count, and is stored again. What
-//! goes wrong with the link meanwhile is repaired by the [session](crate::send::session), as for any other job.
+//! goes wrong with the link meanwhile is repaired by the [session](crate::transit::session), as for any other job.
 
 use std::convert::Infallible;
 use std::time::Duration;
@@ -9,10 +9,11 @@ use std::time::Duration;
 use protocol::link::message::NAME_MAX;
 
 use super::{Caller, Failure, Packed};
-use crate::send::journal::fresh_number;
-use crate::send::query::{Query, Shelf};
-use crate::send::session::{Outcome, Record, Session};
-use crate::send::{self, Address, Event, RunError};
+use crate::connection::Address;
+use crate::questions::query::{Query, Shelf};
+use crate::transit::journal::fresh_number;
+use crate::transit::session::{Outcome, Record, Session};
+use crate::transit::{self, Event, RunError};
 
 /// How long a bridge may take to answer.
 const BRIDGE: Duration = Duration::from_secs(3);
@@ -46,7 +47,7 @@ pub fn store(packed: &Packed<'_>, address: &Address, caller: &dyn Caller) -> Res
     let mut session = Session::storing(record, data, name);
     observer.begin("storing in the bridge", data.len() as u64);
     let mut shown = 0;
-    let result = send::run_at(
+    let result = transit::run_at(
         &mut session,
         address,
         &mut |_| Ok::<(), Infallible>(()),

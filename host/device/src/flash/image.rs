@@ -4,6 +4,10 @@
 //! first sector points to a table of entries, some of which are strings with an identifier.
 //! Source: RP2040 C/C++ SDK, `pico_binary_info`.
 
+use std::fs::File;
+use std::io::{self, Read as _};
+use std::path::{Path, PathBuf};
+
 use uf2::{Chip, Image, Uf2Error};
 
 /// The program's name in its binary info.
@@ -29,6 +33,27 @@ pub enum ImageError {
         "not flashed: this is {}, not the bridge's firmware; to install it anyway, copy the file to the board's drive", named(.0)
     )]
     OtherProgram(Option<String>),
+}
+
+/// Why there is no firmware of a file.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// The file cannot be read.
+    #[error("cannot read {}", .path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: io::Error,
+    },
+    /// The file is not the bridge's firmware.
+    #[error("{}", .path.display())]
+    Image {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: ImageError,
+    },
 }
 
 fn named(program: &Option<String>) -> String {
@@ -59,21 +84,14 @@ impl Firmware {
         Ok(Firmware { file: file.to_vec(), image, version })
     }
 
-    /// The firmware included in this program, for each board or for none. Released programs are built with
-    /// `FOILPRESS_FIRMWARE` naming what `cargo xtask firmware` writes.
-    pub fn embedded() -> Result<Vec<Firmware>, ImageError> {
-        FILES.iter().map(|(file, _)| Firmware::read(file)).collect()
-    }
-
-    /// The included firmware for the board of a bridge that reports this version.
-    pub fn embedded_for(version: &str) -> Option<Firmware> {
-        Firmware::embedded().ok()?.into_iter().find(|firmware| firmware.chip() == chip_of(version))
-    }
-
-    /// The ELF file that firmware was made from, which is needed to decode its log.
-    pub fn embedded_program_for(version: &str) -> Option<&'static [u8]> {
-        let is_its = |file: &[u8]| Firmware::read(file).is_ok_and(|ours| ours.chip() == chip_of(version));
-        FILES.iter().find(|(file, _)| is_its(file)).and_then(|&(_, program)| program)
+    /// Opens and reads a UF2 file.
+    pub fn open(path: &Path) -> Result<Firmware, FileError> {
+        let cannot = |source| FileError::Read { path: path.to_owned(), source };
+        let mut file = Vec::new();
+        // One byte more than the largest valid file, so that the reader refuses a larger one.
+        let most = uf2::LARGEST_FILE as u64 + 1;
+        File::open(path).map_err(cannot)?.take(most).read_to_end(&mut file).map_err(cannot)?;
+        Firmware::read(&file).map_err(|source| FileError::Image { path: path.to_owned(), source })
     }
 
     /// The file it was read from.
@@ -98,12 +116,10 @@ impl Firmware {
 }
 
 /// The chip of a bridge that reports this version: a Pico does not name itself.
-fn chip_of(version: &str) -> Chip {
+pub(super) fn chip_of(version: &str) -> Chip {
     let named = |chip: &Chip| version.ends_with(&format!("({chip})"));
     Chip::ALL.into_iter().find(named).unwrap_or(Chip::Rp2040)
 }
-
-include!(concat!(env!("OUT_DIR"), "/firmware.rs"));
 
 /// A string of the program's binary info.
 fn entry(image: &Image, wanted: u32) -> Option<String> {
@@ -219,13 +235,6 @@ pub(super) mod tests {
                 image[at] = value;
             }
             let _ = Firmware::read(&uf2::encode(Chip::Rp2040, &[(0x1000_0000, &image)]).unwrap());
-        }
-    }
-
-    #[test]
-    fn what_this_program_was_built_with_is_the_bridges_firmware() {
-        for firmware in Firmware::embedded().unwrap() {
-            assert_eq!(chip_of(firmware.version()), firmware.chip());
         }
     }
 }

@@ -8,6 +8,7 @@
 
 pub mod drive;
 pub mod image;
+pub mod installed;
 pub mod picoboot;
 #[cfg(test)]
 mod rom;
@@ -19,10 +20,10 @@ use std::io::{self, ErrorKind};
 use std::path::PathBuf;
 use std::time::Duration;
 
-use crate::send::find::{self, Candidate};
-use crate::send::query::{Query, QueryError};
-use crate::send::session::Bridge;
-use crate::send::{Address, OpenError};
+use crate::connection::Bridge;
+use crate::connection::find::{self, Candidate};
+use crate::connection::{Address, OpenError};
+use crate::questions::query::{Query, QueryError};
 use drive::DriveError;
 use image::Firmware;
 use observe::Observer;

@@ -385,7 +385,7 @@ mod tests {
         let (old, new) = (image(1), image(2));
         let mut waits = 0;
         for transfers in 0.. {
-            let board = Board::of(Chip::Rp2350);
+            let board = Board::for_chip(Chip::Rp2350);
             Picoboot::write(Rom::new(&board), &old, &Silent).unwrap();
             assert!(board.borrow().restarted && board.borrow().starts());
             (board.borrow_mut().restarted, board.borrow_mut().transfers_left) = (false, Some(transfers));

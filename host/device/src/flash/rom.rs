@@ -28,10 +28,10 @@ pub struct Board {
 
 impl Board {
     pub fn new() -> Rc<RefCell<Board>> {
-        Board::of(Chip::Rp2040)
+        Board::for_chip(Chip::Rp2040)
     }
 
-    pub fn of(chip: Chip) -> Rc<RefCell<Board>> {
+    pub fn for_chip(chip: Chip) -> Rc<RefCell<Board>> {
         let bytes = if chip == Chip::Rp2040 { 2 << 20 } else { 4 << 20 };
         Rc::new(RefCell::new(Board {
             chip,

@@ -157,14 +157,14 @@ fn a_running_bridge_is_flashed_and_says_its_new_version() {
 fn a_pico_2_is_known_in_its_boot_loader_and_gets_its_own_image() {
     for state in [State::Running, State::Loader] {
         let mut desk = desk(state);
-        desk.board = Board::of(Chip::Rp2350);
+        desk.board = Board::for_chip(Chip::Rp2350);
         assert_eq!(desk.flash("9.8.7 (Pico 2)", None).unwrap().firmware, "9.8.7 (Pico 2)");
         let board = desk.board.borrow();
         assert!(board.starts() && board.flash[0x124..0x128] == *b"\xd3\xde\xff\xff");
     }
     // And through its drive.
     let mut desk = desk(State::Running);
-    desk.board = Board::of(Chip::Rp2350);
+    desk.board = Board::for_chip(Chip::Rp2350);
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("INFO_UF2.TXT"), "Board-ID: RP2350\n").unwrap();
     (desk.drive, desk.closed) = (Some(folder), Some(ErrorKind::PermissionDenied));
@@ -175,7 +175,7 @@ fn a_pico_2_is_known_in_its_boot_loader_and_gets_its_own_image() {
 #[test]
 fn a_board_without_an_image_is_left_as_it_was_and_started_again() {
     let mut desk = desk(State::Running);
-    desk.board = Board::of(Chip::Rp2350);
+    desk.board = Board::for_chip(Chip::Rp2350);
     let pico = Firmware::read(&file("foilpress-bridge", "1", 20_000, 5)).unwrap();
     let error = run(&[pico], None, &mut desk, &Silent).unwrap_err();
     assert!(error.to_string().contains("this board is a Pico 2, but the firmware is for a Pico;"), "{error}");

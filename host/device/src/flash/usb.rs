@@ -8,7 +8,7 @@ use uf2::Chip;
 use rusb::{Direction, Recipient, RequestType};
 
 use super::picoboot::Pipe;
-use crate::send::usb::{Attached, Pair, attached, translated};
+use crate::connection::usb::{Attached, Pair, attached, translated};
 
 /// The boot ROM of a chip.
 fn numbers(chip: Chip) -> (u16, u16) {

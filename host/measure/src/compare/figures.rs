@@ -13,9 +13,9 @@ use inks::Curve;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::flat::Window;
-use crate::geometry::{Vector, along, cross, dot, unit};
-use crate::linear::Cholesky;
+use super::flat::ComparedArea;
+use crate::geometry::scene::{Vector, along, cross, dot, unit};
+use crate::linalg::Cholesky;
 
 /// What makes factors unique where stacks always come together, relative to a stack that covers everything.
 const HELD: f64 = 1e-8;
@@ -120,7 +120,7 @@ pub(crate) struct Lights<'a> {
 
 impl Cover {
     /// Lights the spots.
-    pub(crate) fn lights(&self, window: &Window, lighting: &Lighting) -> Lights<'_> {
+    pub(crate) fn lights(&self, window: &ComparedArea, lighting: &Lighting) -> Lights<'_> {
         let n = self.curves.len();
         let mut light = vec![[0.0; 3]; self.shares.len()];
         light.par_chunks_exact_mut(n).zip(self.shares.par_chunks_exact(n)).enumerate().for_each(
@@ -139,7 +139,7 @@ impl Cover {
 
 impl Lights<'_> {
     /// The curves' lights of a spot.
-    fn of(&self, spot: usize) -> &[[f64; 3]] {
+    fn at_spot(&self, spot: usize) -> &[[f64; 3]] {
         let n = self.cover.curves.len();
         &self.light[spot * n..][..n]
     }
@@ -170,7 +170,7 @@ pub(crate) fn errors(
     steps: &Steps<'_>,
     lights: &Lights<'_>,
     names: &[String],
-    window: &Window,
+    window: &ComparedArea,
     scale: [f64; 3],
 ) -> Option<(Errors, Vec<Factor>)> {
     let known: Vec<usize> = (0..steps.photo.len()).filter(|&i| steps.photo[i].is_some()).collect();
@@ -200,7 +200,7 @@ fn fitted(
     steps: &Steps<'_>,
     lights: &Lights<'_>,
     names: &[String],
-    window: &Window,
+    window: &ComparedArea,
     known: &[usize],
     scale: [f64; 3],
 ) -> (Spots, Vec<Factor>) {
@@ -225,7 +225,7 @@ fn fitted(
         let off = |i: usize| steps.photo[i].map_or(0.0, |rgb| rgb[c] - steps.print[i][c]);
         for &i in known {
             whole += steps.print[i][c].powi(2);
-            let light = lights.of(i);
+            let light = lights.at_spot(i);
             for (a, from) in light.iter().enumerate().filter(|(_, l)| l[c] != 0.0) {
                 right[a] += from[c] * off(i);
                 for (b, to) in light.iter().enumerate() {
@@ -238,7 +238,8 @@ fn fitted(
         }
         let Some(system) = Cholesky::new(&normal, n) else { continue };
         let by = system.solve(&right);
-        let along = |i: usize, by: &[f64]| lights.of(i).iter().zip(by).map(|(l, by)| l[c] * by).sum::<f64>();
+        let along =
+            |i: usize, by: &[f64]| lights.at_spot(i).iter().zip(by).map(|(l, by)| l[c] * by).sum::<f64>();
         for &i in known {
             added[i][c] = along(i, &by);
         }
@@ -292,7 +293,7 @@ mod tests {
 
     /// A print of two stacks in stripes, 20 mm wide.
     struct Print {
-        window: Window,
+        window: ComparedArea,
         lighting: Lighting,
         names: [String; 2],
         cover: Cover,
@@ -303,7 +304,7 @@ mod tests {
             let curve = |v: f64| Curve::sampled(&[0.0, 0.5, 1.5], |t| [v * (1.0 + t), v, 0.5 * v]);
             let share = |i: usize| if i % 20 < 10 { [1.0f32, 0.0] } else { [0.25, 0.75] };
             Print {
-                window: Window::new([0.0, 0.0], [21.0, 21.0], 2.0),
+                window: ComparedArea::new([0.0, 0.0], [21.0, 21.0], 2.0),
                 lighting: Lighting { eye: [0.0, 0.0, 500.0], lamp: [200.0, 100.0, 500.0], middle: [0.0; 2] },
                 names: ["C".to_string(), "MS".to_string()],
                 cover: Cover {
@@ -321,7 +322,7 @@ mod tests {
         fn seen(&self, factor: [f64; 2]) -> Spots {
             let lights = self.lights();
             let spot =
-                |i: usize| std::array::from_fn(|c| (0..2).map(|s| factor[s] * lights.of(i)[s][c]).sum());
+                |i: usize| std::array::from_fn(|c| (0..2).map(|s| factor[s] * lights.at_spot(i)[s][c]).sum());
             (0..400).map(spot).collect()
         }
 

@@ -20,7 +20,7 @@ const LONGEST: f64 = 1000.0;
 
 /// The part of the sheet that is compared, in spots and in pixels.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Window {
+pub(crate) struct ComparedArea {
     /// Its middle and its size in mm of the sheet's frame.
     pub(crate) middle: [f64; 2],
     pub(crate) size: [f64; 2],
@@ -30,14 +30,14 @@ pub(crate) struct Window {
     pub(crate) height: usize,
 }
 
-impl Window {
+impl ComparedArea {
     /// A window with about `pixels` pixels a millimetre.
-    pub(crate) fn new(middle: [f64; 2], size: [f64; 2], pixels: f64) -> Window {
+    pub(crate) fn new(middle: [f64; 2], size: [f64; 2], pixels: f64) -> ComparedArea {
         let squares = size.map(|side| (side / APART).round().max(2.0) as usize);
         let most = (LONGEST / squares[0].max(squares[1]) as f64).floor().max(1.0);
         let fine = pixels.round().clamp(1.0, most.min(8.0)) as usize;
         let [width, height] = squares.map(|count| count * fine);
-        Window { middle, size, squares, width, height }
+        ComparedArea { middle, size, squares, width, height }
     }
 
     /// A place of the picture (pixels from its top left corner) in mm of the sheet's frame.
@@ -158,7 +158,7 @@ mod tests {
             (0..2).for_each(|_| bases.push(&[0.1; 12]));
             let maps = WeightMaps::new(width, height, 2, data).unwrap();
             let factored = Factored { space: Space::half_angle(4), bases, maps };
-            let window = Window::new([3.0, -4.0], squares.map(|n| n as f64), 1.0);
+            let window = ComparedArea::new([3.0, -4.0], squares.map(|n| n as f64), 1.0);
             let found = window.shares(&Source::Factored(&factored)).unwrap();
             let [across, down] = window.spots();
             assert_eq!(found.len(), across * down * 2);
@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn spots_are_counted_from_the_top_left() {
-        let window = Window::new([1.0, 2.0], [4.0, 3.0], 5.0);
+        let window = ComparedArea::new([1.0, 2.0], [4.0, 3.0], 5.0);
         assert_eq!((window.squares, window.width, window.height), ([4, 3], 20, 15));
         assert_eq!(window.spot(0), [0.0, 2.5]);
         assert_eq!(window.spot(5), [2.0, 1.5]);

@@ -1,39 +1,38 @@
 //! Photographs of a printed sheet beside what was predicted of it.
 //!
-//! In the order of the data: [`Setup`] says where lamps stood; `sheet` finds the camera marks of the dots that were printed, and
-//! [`crate::marks`] those of each photograph, which says whether it shows this sheet; [`crate::camera`] solves for lens and
+//! In the order of the data: [`CompareSetup`] says where lamps stood; `geometry::sheet_marks` finds the camera marks of the dots that were printed, and
+//! [`geometry::marks`](crate::geometry::marks) those of each photograph, which says whether it shows this sheet; [`geometry::pose`](crate::geometry::pose) solves for lens and
 //! poses; the paper around the marks, or a grey card, gives exposure and white balance; `picture` lays the
 //! photograph flat; `scenery` shows document, mixture and dots from the same place under the same lamp; `figures` compares them,
 //! and [`page`] shows all of it.
 //! Limits: a flat sheet; one lamp at a time, which is a point; no light from elsewhere, which looks like an error of the inks.
 
+mod comparison;
 mod figures;
 mod flat;
+mod inputs;
 pub mod page;
 pub(crate) mod picture;
 mod scenery;
 mod setup;
-pub(crate) mod sheet;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use appearance::brdf::Space;
-use appearance::factor::Factored;
-use inks::Library;
 use observe::Observer;
-use press::sheet::{Area, DotMap};
-use serde::Serialize;
 
+pub use comparison::{Comparison, LensFigures, PhotoFigures, Pictures};
 pub use figures::{Errors, Factor};
-pub use setup::{Card, Setup, White};
+pub use inputs::{ComparedDocument, ComparedPrint, space};
+pub use setup::{Card, CompareSetup, White};
 
 use crate::MeasureError;
-use crate::camera::{self, Camera, Known, Seen};
-use crate::marks::Mark;
-use crate::photo;
+use crate::camera::photo;
+use crate::geometry::marks::Mark;
+use crate::geometry::pose::{self, Known, MarkPoint, SolvedCamera};
+use crate::geometry::sheet_marks::{PrintedMark, SheetMarks};
+use inputs::SheetPhoto;
 use picture::Picture;
 use scenery::Scenery;
-use sheet::Marks;
 
 /// Corners that lie farther than this from where a flat sheet has them, in pixels and in picture widths, are not on one.
 const MOST_RESIDUAL: (f64, f64) = (1.0, 6e-4);
@@ -44,129 +43,17 @@ const UNSURE: f64 = 3.0;
 /// The most photographs of a comparison.
 const MOST_PHOTOS: usize = 64;
 
-/// What was printed, and of what.
-pub struct Printed<'a> {
-    /// The dots of the whole sheet, marks included.
-    pub sheet: &'a DotMap,
-    /// The library that predicts them.
-    pub library: &'a Library,
-    /// The document, where there is one.
-    pub document: Option<Document<'a>>,
-}
-
-/// The tabulation of stacks: so fine that reading between its angles is exact to a thousandth, as a document's own is not.
-pub fn space() -> Space {
-    Space::half_angle(512)
-}
-
-/// A document and where it is on the sheet.
-pub struct Document<'a> {
-    /// The document.
-    pub document: &'a Factored,
-    /// Its mixture of stacks, tabulated as [`space`] says.
-    pub mapped: &'a Factored,
-    /// One copy of it.
-    pub area: Area,
-}
-
-/// A comparison: figures that do not depend on pictures.
-#[derive(Clone, Debug, Serialize)]
-pub struct Comparison {
-    /// Whether there is a document to compare with.
-    pub document: bool,
-    /// Middle and size of what was compared, in mm of the sheet's frame.
-    pub middle_mm: [f64; 2],
-    /// Its size.
-    pub size_mm: [f64; 2],
-    /// The lens.
-    pub lens: LensFigures,
-    /// Each photograph.
-    pub photos: Vec<PhotoFigures>,
-    /// Root mean square of the photographs' errors.
-    pub errors: Errors,
-    /// What is doubtful, and what to do.
-    pub warnings: Vec<String>,
-}
-
-/// The lens as solved.
-#[derive(Clone, Debug, Serialize)]
-pub struct LensFigures {
-    /// Focal length in pixels.
-    pub focal_px: f64,
-    /// Its relative standard error.
-    pub focal_error: f64,
-    /// Angle of view across the width.
-    pub field_of_view_deg: f64,
-    /// Radial terms over the distance from the middle in focal lengths.
-    pub radial: [f64; 2],
-}
-
-/// One photograph.
-#[derive(Clone, Debug, Serialize)]
-pub struct PhotoFigures {
-    /// File name.
-    pub name: String,
-    /// Marks that were found.
-    pub marks: usize,
-    /// Where the camera was, in mm of the sheet's frame.
-    pub camera_mm: [f64; 3],
-    /// Its standard error.
-    pub camera_error_mm: f64,
-    /// The camera's axes right, down and forward, on the sheet.
-    pub camera_axes: [[f64; 3]; 3],
-    /// Distance of the marks' corners from where they should be, in pixels.
-    pub residual_px: f64,
-    /// Where the lamp was.
-    pub light_mm: [f64; 3],
-    /// Angle of incidence, angle to the camera and half angle in the middle, in degrees.
-    pub angles_deg: [f64; 3],
-    /// Least and largest half angle.
-    pub half_angles_deg: [f64; 2],
-    /// Factor from the file's values, 0 to 1, to radiance under irradiance 1.
-    pub scale: [f64; 3],
-    /// How far the paper at the marks deviates from the lamp's fall-off.
-    pub paper_deviation: f64,
-    /// Share of the compared spots that were seen and not clipped.
-    pub seen: f64,
-    /// Errors.
-    pub errors: Errors,
-    /// Stacks that are brighter or darker than the library says.
-    pub stacks: Vec<Factor>,
-}
-
-/// The pictures of one photograph, laid flat, as JPEG.
-pub struct Pictures {
-    /// The photograph.
-    pub photo: Vec<u8>,
-    /// The predicted print.
-    pub print: Vec<u8>,
-    /// The document and its mixture of stacks.
-    pub document: Option<(Vec<u8>, Vec<u8>)>,
-    /// Photograph against print.
-    pub difference: Vec<u8>,
-}
-
-/// A photograph that shows the sheet. It is read again to be compared, so that many do not fill the memory.
-struct Shot {
-    path: PathBuf,
-    name: String,
-    light: usize,
-    size: (usize, usize),
-    bent: bool,
-    marks: Vec<(Mark, sheet::Printed)>,
-}
-
 /// Compares the photographs in a folder with what was printed.
 ///
 /// # Errors
 /// Photographs that cannot be read, do not show the sheet, differ in size or are too bright; a sheet without marks.
 pub fn compare(
     folder: &Path,
-    setup: &Setup,
-    printed: &Printed<'_>,
+    setup: &CompareSetup,
+    printed: &ComparedPrint<'_>,
     observer: &dyn Observer,
 ) -> Result<(Comparison, Vec<Pictures>), MeasureError> {
-    let sheet = Marks::of(printed.sheet, printed.library)?;
+    let sheet = SheetMarks::find(printed.sheet, printed.library)?;
     let paths = photo::list(folder)?;
     if paths.len() > MOST_PHOTOS {
         return Err(MeasureError::Scene(format!(
@@ -176,7 +63,7 @@ pub fn compare(
         )));
     }
     observer.begin("finding marks", paths.len() as u64);
-    let mut shots: Vec<Shot> = Vec::new();
+    let mut shots: Vec<SheetPhoto> = Vec::new();
     for path in &paths {
         let shot = read(path, setup, &sheet)?;
         if let Some(first) = shots.first()
@@ -275,7 +162,7 @@ fn together(photos: &[PhotoFigures]) -> Errors {
 }
 
 /// Reads a photograph and finds the sheet's marks in it.
-fn read(path: &Path, setup: &Setup, sheet: &Marks) -> Result<Shot, MeasureError> {
+fn read(path: &Path, setup: &CompareSetup, sheet: &SheetMarks) -> Result<SheetPhoto, MeasureError> {
     let wrong = |problem: String| Err(MeasureError::photo(path, problem));
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let Some(light) = setup.light_of(&name) else {
@@ -286,7 +173,7 @@ fn read(path: &Path, setup: &Setup, sheet: &Marks) -> Result<Shot, MeasureError>
     };
     let picture = Picture::read(path, setup.linear)?;
     let marks = sheet.seen(path, &picture.grey())?;
-    Ok(Shot {
+    Ok(SheetPhoto {
         path: path.to_path_buf(),
         name,
         light,
@@ -297,14 +184,14 @@ fn read(path: &Path, setup: &Setup, sheet: &Marks) -> Result<Shot, MeasureError>
 }
 
 /// Solves for the camera.
-fn solved(first: &Path, setup: &Setup, shots: &[Shot]) -> Result<Camera, MeasureError> {
+fn solved(first: &Path, setup: &CompareSetup, shots: &[SheetPhoto]) -> Result<SolvedCamera, MeasureError> {
     let (width, height) = shots[0].size;
-    let seen: Vec<Vec<Seen>> = shots
+    let seen: Vec<Vec<MarkPoint>> = shots
         .iter()
         .map(|shot| {
-            let corners = |(mark, known): &(Mark, sheet::Printed)| {
+            let corners = |(mark, known): &(Mark, PrintedMark)| {
                 let (mark, known) = (*mark, *known);
-                (0..4).map(move |i| Seen { sheet: known.corners[i], pixel: mark.corners[i] })
+                (0..4).map(move |i| MarkPoint { sheet: known.corners[i], pixel: mark.corners[i] })
             };
             shot.marks.iter().flat_map(corners).collect()
         })
@@ -320,7 +207,7 @@ fn solved(first: &Path, setup: &Setup, shots: &[Shot]) -> Result<Camera, Measure
         focal,
         position: setup.camera.position_mm.map(|at| (at, setup.camera.tolerance_mm.unwrap_or(20.0))),
     };
-    let Some(camera) = camera::solve(&seen, (width, height), &known) else {
+    let Some(camera) = pose::solve(&seen, (width, height), &known) else {
         return Err(MeasureError::Scene(
             "no camera explains where the marks are; check that the photographs are not mirrored or cropped, and that \
              camera.field_of_view_deg and camera.position_mm are right"

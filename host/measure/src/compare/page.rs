@@ -8,7 +8,8 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use press::html::{self, escape};
 
-use super::{Comparison, Errors, PhotoFigures, Pictures};
+use super::comparison::{Comparison, PhotoFigures, Pictures};
+use super::figures::Errors;
 
 /// Stacks listed for a photograph.
 const STACKS: usize = 12;

@@ -15,17 +15,19 @@ use image::codecs::jpeg::JpegEncoder;
 use inks::{Curve, Stack};
 use observe::Observer;
 use press::preview::{Radiance, Source, ToneCurve, picture as picture_of};
-use press::sheet::Area;
+use sheet::Area;
 use view::{Light, Lit, Renderer, Scene};
 
+use super::comparison::{PhotoFigures, Pictures};
 use super::figures::{self, Cover, Lighting, Scale, Spots, Steps};
-use super::flat::{Flat, Window};
+use super::flat::{ComparedArea, Flat};
+use super::inputs::{ComparedPrint, SheetPhoto, space};
 use super::picture::Picture;
-use super::{Card, PhotoFigures, Pictures, Printed, Setup, Shot, White, space};
+use super::setup::{Card, CompareSetup, White};
 use crate::MeasureError;
-use crate::camera::{Camera, Lens, Pose};
-use crate::card;
-use crate::linear::{median, spread};
+use crate::curves::card;
+use crate::geometry::pose::{Lens, Pose, SolvedCamera};
+use crate::linalg::{median, spread};
 
 /// Quality of the pictures: differences of a percent stay visible.
 const QUALITY: u8 = 88;
@@ -34,7 +36,7 @@ const DIFFERENCE: f64 = 0.3;
 
 /// What is compared, prepared once for all photographs.
 pub(super) struct Scenery {
-    window: Window,
+    window: ComparedArea,
     print: Shown,
     document: Option<(Shown, Shown)>,
     stacks: Vec<String>,
@@ -48,7 +50,7 @@ struct Shown {
 }
 
 impl Shown {
-    fn new(source: &Source<'_>, rows: &Table, window: &Window) -> Result<Shown, MeasureError> {
+    fn new(source: &Source<'_>, rows: &Table, window: &ComparedArea) -> Result<Shown, MeasureError> {
         let metres = window.size.map(|side| side / 1000.0);
         let longest = window.width.max(window.height).clamp(64, 2048);
         let lit = Lit::new(source, metres, longest).map_err(view_error)?;
@@ -64,14 +66,14 @@ fn view_error(error: impl std::fmt::Display) -> MeasureError {
 
 impl Scenery {
     pub(super) fn new(
-        printed: &Printed<'_>,
+        printed: &ComparedPrint<'_>,
         area: Area,
         middle: [f64; 2],
         size: [f64; 2],
-        shot: &Shot,
-        camera: &Camera,
+        shot: &SheetPhoto,
+        camera: &SolvedCamera,
     ) -> Result<Scenery, MeasureError> {
-        let Printed { sheet, library, document } = printed;
+        let ComparedPrint { sheet, library, document } = printed;
         let space = &space();
         // As fine as the photographs are.
         let pixels = camera.lens.density(&camera.poses[0], middle);
@@ -81,7 +83,7 @@ impl Scenery {
                 shot.name
             )));
         }
-        let window = Window::new(middle, size, pixels);
+        let window = ComparedArea::new(middle, size, pixels);
         let rows = reflectances(sheet.stacks(), library, space);
         let print = Shown::new(&Source::Print { dots: sheet, space, stacks: &rows, area }, &rows, &window)?;
         let factored =
@@ -99,10 +101,10 @@ impl Scenery {
     /// One photograph beside its prediction.
     pub(super) fn compared(
         &self,
-        shot: &Shot,
+        shot: &SheetPhoto,
         number: usize,
-        camera: &Camera,
-        setup: &Setup,
+        camera: &SolvedCamera,
+        setup: &CompareSetup,
         observer: &dyn Observer,
     ) -> Result<(PhotoFigures, Pictures), MeasureError> {
         let (pose, lens) = (&camera.poses[number], &camera.lens);
@@ -189,7 +191,7 @@ impl Scenery {
     /// from them. Marks that differ leave the factors uncertain.
     fn paper_scale(
         &self,
-        shot: &Shot,
+        shot: &SheetPhoto,
         picture: &Picture,
         lighting: &Lighting,
     ) -> Result<(Scale, f64), MeasureError> {
@@ -244,7 +246,7 @@ impl Scenery {
 
 /// The factors that make the middle step of a grey card in the sheet's plane as bright as it is.
 fn card_scale(
-    shot: &Shot,
+    shot: &SheetPhoto,
     picture: &Picture,
     stated: &Card,
     lighting: &Lighting,

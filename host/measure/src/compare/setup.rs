@@ -18,7 +18,7 @@ const FARTHEST: f64 = 100_000.0;
 /// What the camera file says.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Setup {
+pub struct CompareSetup {
     /// Version of the format: 1.
     pub format: u32,
     /// What is known of the camera; the marks tell the rest.
@@ -87,21 +87,22 @@ impl Default for Card {
     }
 }
 
-impl Setup {
+impl CompareSetup {
     /// Reads and checks a camera file.
     ///
     /// # Errors
     /// The field, what was found and what to do.
-    pub fn read(path: &Path) -> Result<Setup, MeasureError> {
-        parsed(path, "a camera file", Setup::parse)
+    pub fn read(path: &Path) -> Result<CompareSetup, MeasureError> {
+        parsed(path, "a camera file", CompareSetup::parse)
     }
 
     /// Reads and checks the text of a camera file.
     ///
     /// # Errors
     /// The field, what was found and what to do.
-    pub fn parse(text: &str) -> Result<Setup, String> {
-        let setup: Setup = toml::from_str(text).map_err(|error| error.to_string().trim_end().to_owned())?;
+    pub fn parse(text: &str) -> Result<CompareSetup, String> {
+        let setup: CompareSetup =
+            toml::from_str(text).map_err(|error| error.to_string().trim_end().to_owned())?;
         setup.check()?;
         Ok(setup)
     }
@@ -196,7 +197,7 @@ mod tests {
 
     #[test]
     fn wrong_fields_are_named_with_what_to_do() {
-        assert!(Setup::parse(&format!("format = 1\n{LAMP}")).is_ok());
+        assert!(CompareSetup::parse(&format!("format = 1\n{LAMP}")).is_ok());
         for (text, words) in [
             (format!("format = 2\n{LAMP}"), "format: 2"),
             ("format = 1".into(), "position_mm"),
@@ -215,7 +216,7 @@ mod tests {
             (format!("format = 1\n[card]\nreflectance = [0.9, 0.9, 0.1]\n{LAMP}"), "card.reflectance"),
             (format!("format = 1\n[card]\nrectangle_px = [9, 9, 1, 1]\n{LAMP}"), "card.rectangle_px"),
         ] {
-            let said = Setup::parse(&text).unwrap_err();
+            let said = CompareSetup::parse(&text).unwrap_err();
             assert!(said.contains(words), "{text}\n{said}");
         }
     }
@@ -223,7 +224,7 @@ mod tests {
     #[test]
     fn the_longest_beginning_names_the_lamp() {
         let text = "format = 1\n[[light]]\nposition_mm = [1, 1, 500]\nphotos = \"left\"\n[[light]]\nposition_mm = [2, 2, 500]\nphotos = \"left-low\"\n";
-        let setup = Setup::parse(text).unwrap();
+        let setup = CompareSetup::parse(text).unwrap();
         assert_eq!(setup.light_of("left-1.png"), Some(0));
         assert_eq!(setup.light_of("left-low-1.png"), Some(1));
         assert_eq!(setup.light_of("right.png"), None);

@@ -10,7 +10,7 @@ use protocol::paper::{LEFT, Paper};
 use super::error::ChartError;
 use super::sketch::{Sketch, mm};
 use crate::layout::{Mm, Point, Profile};
-use crate::sheet::DotMap;
+use sheet::DotMap;
 
 /// Where the middle of the first cross belongs, in millimetres from the left and the top edge of the sheet.
 const CROSS: (f64, f64) = (20.0, 30.0);

@@ -2,10 +2,10 @@
 
 use inks::Stack;
 
-use crate::halftone::HalftoneError;
 use crate::layout::{Cut, LayoutError};
-use crate::sheet::SheetError;
 use appearance::weights::WeightError;
+use halftone::HalftoneError;
+use sheet::SheetError;
 
 /// Why a chart cannot be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -6,9 +6,9 @@ use protocol::ink::Kind;
 use super::error::ChartError;
 use super::sketch::{LINE, Sketch, mm};
 use super::steps::{LABEL, pen, two};
-use crate::halftone::Method;
-use crate::sheet::DotMap;
+use halftone::Method;
 use observe::Observer;
+use sheet::DotMap;
 
 /// Shares of the flat patches: those where patterns and bands show most.
 const FLAT: [f64; 4] = [0.02, 0.1, 0.3, 0.5];

@@ -2,7 +2,7 @@
 //!
 //! [`ramp()`] and [`ladder`] are figures 2 and 5 of the 2009 paper, [`stacks`] lays all stacks side by side for measuring,
 //! [`halftones`] the halftones, [`registration()`] shows how far passes are apart, [`calibration()`] where the printer starts and how far it feeds. Each gives
-//! a [`DotMap`](crate::sheet::DotMap) that is laid out and printed like any other.
+//! a [`DotMap`](sheet::DotMap) that is laid out and printed like any other.
 
 pub mod calibration;
 mod error;

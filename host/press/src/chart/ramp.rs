@@ -13,8 +13,8 @@ use protocol::ink::Kind;
 use super::error::ChartError;
 use super::sketch::{LINE, Sketch, mm};
 use super::steps::{LABEL, pen, two};
-use crate::halftone::Method;
-use crate::sheet::{Area, DotMap};
+use halftone::Method;
+use sheet::{Area, DotMap};
 
 /// Dots of the largest clusters.
 pub const MOST: usize = 24;

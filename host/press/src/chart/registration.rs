@@ -13,7 +13,7 @@ use super::error::ChartError;
 use super::sketch::{LETTER, LINE, Sketch, mm};
 use crate::layout::Mm;
 use crate::layout::camera::{QUIET, SIDE};
-use crate::sheet::DotMap;
+use sheet::DotMap;
 
 /// From line to line in the first ink, in dots.
 const PITCH: usize = 24;

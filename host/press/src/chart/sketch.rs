@@ -10,12 +10,12 @@ use embedded_graphics::text::{Baseline, Text};
 use inks::{Library, Stack};
 
 use super::error::ChartError;
-use crate::halftone::{self, Method, halftone};
 use crate::layout::Mm;
-use crate::sheet::{DotMap, SheetError};
 use appearance::gamut::InkMix;
 use appearance::weights::{ONE, WeightMaps};
+use halftone::{Method, halftone};
 use observe::Observer;
+use sheet::{DotMap, SheetError};
 
 /// Width of a letter of scale 1 in dots.
 pub(super) const LETTER: usize = 10;

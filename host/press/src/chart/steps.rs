@@ -6,11 +6,11 @@ use protocol::paper::Paper;
 
 use super::error::ChartError;
 use super::sketch::{LETTER, LINE, Sketch, mm};
-use crate::halftone::Method;
 use crate::layout::camera::{QUIET, SIDE};
 use crate::separate::MOST_CARTRIDGES;
-use crate::sheet::DotMap;
+use halftone::Method;
 use observe::Observer;
+use sheet::DotMap;
 
 /// Scale of labels: letters 3.4 mm high.
 pub(super) const LABEL: usize = 4;

@@ -1,11 +1,11 @@
 use super::*;
-use crate::halftone::Method;
 use crate::layout::{Layout, Mm, Point, Position, Profile, arrange};
-use crate::sheet::DotMap;
+use halftone::Method;
 use inks::{Library, Stack};
 use observe::Silent;
 use protocol::ink::Ink;
 use protocol::paper::Paper;
+use sheet::DotMap;
 
 fn stack(text: &str) -> Stack {
     text.parse().unwrap()

@@ -30,12 +30,13 @@ mod tests {
     use super::*;
     use crate::inspect::inspect;
     use crate::job::stream::write_job;
-    use crate::separate::{Pass, Plane};
+    use crate::separate::Pass;
     use observe::Silent;
     use proptest::prelude::*;
     use protocol::ink::Ink;
     use protocol::paper::Paper;
     use protocol::rgl::Page;
+    use sheet::Plane;
 
     /// A job of stripes, the page's own rows long.
     fn job(inks: &[Ink], rows: usize) -> Vec<u8> {

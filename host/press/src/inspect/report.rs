@@ -5,7 +5,8 @@ use protocol::rgl::{Fault, Mode};
 use serde::Serialize;
 
 use crate::job::fault::words;
-use crate::separate::{Pass, Plane};
+use crate::separate::Pass;
+use sheet::Plane;
 
 /// The figures of a stream. Offsets are in bytes from its start; dots and rows are at the job's resolution.
 #[derive(Clone, Debug, PartialEq, Serialize)]

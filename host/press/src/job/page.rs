@@ -1,11 +1,10 @@
 //! The plan as one page to print and lay beside the printer: a single HTML file that loads nothing else.
 
 use std::fmt::Write as _;
-use std::io::Cursor;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use image::{ImageFormat, RgbImage};
+use image::{ExtendedColorType, RgbImage};
 
 use super::plan::{Plan, Suggestion, grouped, plural};
 use super::ribbon;
@@ -25,9 +24,8 @@ pub struct Pictures {
 /// When a picture cannot be compressed.
 pub fn html(plan: &Plan, pictures: &Pictures) -> Result<String, image::ImageError> {
     let encoded = |picture: &RgbImage| {
-        let mut png = Cursor::new(Vec::new());
-        picture.write_to(&mut png, ImageFormat::Png)?;
-        Ok::<String, image::ImageError>(STANDARD.encode(png.into_inner()))
+        let png = pictures::png(picture, picture.dimensions(), ExtendedColorType::Rgb8)?;
+        Ok::<String, image::ImageError>(STANDARD.encode(png))
     };
     let sheet = encoded(&pictures.sheet)?;
     let passes: Vec<String> = pictures.passes.iter().map(encoded).collect::<Result<_, _>>()?;

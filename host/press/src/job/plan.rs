@@ -5,6 +5,7 @@
 use std::fmt::{self, Write as _};
 
 use inks::{Certainty, Library, Severity};
+use observe::visible_line;
 use protocol::ink::{Ink, Kind};
 use protocol::paper::{LEFT, Paper};
 use protocol::rgl::Page;
@@ -16,8 +17,8 @@ use super::ribbon::{self, Use};
 use super::thin::thin;
 use crate::layout::{Cut, Laid, Mm, paper};
 use crate::separate::{Check, MOST_CARTRIDGES, Pass as Dots, Planned, Separation};
-use crate::sheet::colours::colours;
-use crate::sheet::{Area, Sheet};
+use sheet::colours::colours;
+use sheet::{Area, Sheet};
 
 /// Lines of foil thinner than this many dots (0.17 mm) may not stick: foil fails on screens finer than about 100 an inch,
 /// whose smaller dots are of this size.
@@ -472,7 +473,10 @@ impl fmt::Display for Plan {
         writeln!(
             f,
             "{}: {width:.1} x {height:.1} mm ({} x {} dots) on {}",
-            self.document, self.size_dots.0, self.size_dots.1, self.paper
+            visible_line(&self.document),
+            self.size_dots.0,
+            self.size_dots.1,
+            self.paper
         )?;
         let (columns, rows) = self.copies;
         if (columns, rows) != (1, 1) {
@@ -504,7 +508,7 @@ impl fmt::Display for Plan {
         if !self.notes.is_empty() {
             writeln!(f, "\nFrom reading the files:")?;
             for note in &self.notes {
-                writeln!(f, "    {note}")?;
+                writeln!(f, "    {}", visible_line(note))?;
             }
         }
         if !self.suggestions.is_empty() {

@@ -9,7 +9,7 @@
 //! recording of four nearly empty passes (6 to 9 s each, cartridge change included); that a band takes 2 s is a guess.
 
 use crate::layout::Mm;
-use crate::separate::Plane;
+use sheet::Plane;
 
 /// Rows the head prints at once at 600 dpi.
 const BAND: usize = 240;

@@ -3,7 +3,7 @@
 //! Method: the dots that lie in no solid square of `side` x `side` dots (an opening by a square): hairlines, specks and tips,
 //! but not the steps of a slanted edge. Cost: two passes over the dots.
 
-use crate::separate::Plane;
+use sheet::Plane;
 
 /// How many dots lie in no solid square of this side (at least 1), and how many there are.
 pub(super) fn thin(plane: &Plane, side: usize) -> (u64, u64) {

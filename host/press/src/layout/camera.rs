@@ -10,8 +10,8 @@
 
 use std::sync::LazyLock;
 
-use crate::sheet::DotMap;
 use crate::split_mix;
+use sheet::DotMap;
 
 /// Cells along a side, the frame included.
 pub const CELLS: usize = 8;

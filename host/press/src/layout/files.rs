@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::{Arranged, Laid};
-use crate::files::{FileError, read_toml, write_toml};
-use crate::sheet::{Area, Sheet};
+use files::{FileError, read_toml, write_toml};
+use sheet::{Area, Sheet};
 
 /// The text beside the sheet's.
 const TEXT: &str = "layout.toml";
@@ -47,11 +47,11 @@ impl Arranged {
 mod tests {
     use super::*;
     use crate::layout::{Layout, Mm, Point, Repeat, arrange};
-    use crate::sheet::DotMap;
     use inks::Stack;
     use observe::Silent;
     use protocol::ink::Ink;
     use protocol::paper::Paper;
+    use sheet::DotMap;
 
     #[test]
     fn a_page_comes_back_with_its_copies_and_nonsense_is_refused() {

@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use crate::sheet::DOTS_PER_MM;
+use sheet::DOTS_PER_MM;
 
 /// A length in millimetres.
 #[derive(Clone, Copy, PartialEq, PartialOrd, Debug, Default)]

@@ -13,8 +13,8 @@ use super::camera::{self, Name, QUIET, SIDE};
 use super::length::Mm;
 use super::rect::Rect;
 use super::settings::{Layout, LayoutError};
-use crate::sheet::DotMap;
-use crate::sheet::order::passes_of;
+use sheet::DotMap;
+use sheet::order::passes_of;
 
 /// From the block to a mark, in millimetres.
 const AWAY: f64 = 1.5;
@@ -28,7 +28,7 @@ const TARGET: f64 = 5.0;
 
 /// What a mark is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Shape {
+pub(super) enum MarkShape {
     /// A filled rectangle.
     Tick,
     /// A cross in a ring that fills the rectangle.
@@ -41,7 +41,7 @@ pub(super) enum Shape {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Mark {
     pub(super) place: Rect,
-    pub(super) shape: Shape,
+    pub(super) shape: MarkShape,
 }
 
 impl Mark {
@@ -51,12 +51,12 @@ impl Mark {
             return false;
         }
         match self.shape {
-            Shape::Tick => true,
-            Shape::Camera(name) => {
+            MarkShape::Tick => true,
+            MarkShape::Camera(name) => {
                 let cell = |at: i64, from: i64| (at - from) as usize / camera::CELL;
                 name.is_dark(cell(x, self.place.left), cell(y, self.place.top))
             }
-            Shape::Target => {
+            MarkShape::Target => {
                 // In half dots from the middle, so that even sides have one.
                 let side = self.place.width();
                 let dx = 2 * (x - self.place.left) + 1 - side;
@@ -104,7 +104,7 @@ pub(super) fn crop(
                 missing += 1;
                 return None;
             }
-            Some(Mark { place: fits, shape: Shape::Tick })
+            Some(Mark { place: fits, shape: MarkShape::Tick })
         })
         .collect();
     (marks, missing)
@@ -133,7 +133,7 @@ pub(super) fn registration(block: Rect, room: Rect, ticks: bool) -> (Vec<Mark>, 
     let marks: Vec<Mark> = places
         .into_iter()
         .filter(|place| place.meet(room) == *place)
-        .map(|place| Mark { place, shape: Shape::Target })
+        .map(|place| Mark { place, shape: MarkShape::Target })
         .collect();
     let missing = places.len() - marks.len();
     (marks, missing)
@@ -154,7 +154,7 @@ fn cameras(block: Rect, room: Rect, layout: &Layout, names: [Name; camera::CORNE
         .zip(names)
         .map(|((left, top), name)| Mark {
             place: Rect { left, top, right: left + side, bottom: top + side },
-            shape: Shape::Camera(name),
+            shape: MarkShape::Camera(name),
         })
         .filter(|mark| mark.place.meet(room) == mark.place)
         .collect();

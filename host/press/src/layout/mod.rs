@@ -20,19 +20,20 @@ pub mod size;
 use inks::Stack;
 use protocol::paper::Paper;
 use protocol::rgl::Resolution;
+use protocol::walk::{EDGE, Frame};
 
 pub use length::{Mm, NoLength, Point};
 pub use profile::Profile;
 pub use rect::Cut;
 pub use settings::{Layout, LayoutError, MOST_REPEATS, Position, Repeat};
-pub use size::{Size, SizeError};
+pub use size::SizeError;
 
-use crate::sheet::{self, Area, DotMap, Sheet, order};
 use block::Block;
 use observe::Observer;
-use page::Page;
+use page::IdealPage;
 use rect::Rect;
 use serde::{Deserialize, Serialize};
+use sheet::{Area, DotMap, Sheet, order};
 
 /// A page, and where things are on it.
 #[derive(Clone, Debug, PartialEq)]
@@ -84,6 +85,37 @@ pub fn check(width: usize, length: usize, layout: &Layout) -> Result<(), LayoutE
     Block::of((width, length), layout).map(|_| ())
 }
 
+/// Where the walk along which a dot map of this size was halftoned begins on the page, and how far it reaches: the first copy.
+/// If its corner lies beyond the sheet, it begins where the walk is the same again. The curve in a tile is its own mirror image, so
+/// that of a mirrored copy begins at the first tile that is whole from the right.
+///
+/// # Errors
+/// Those of [`check`].
+pub fn frame(width: usize, length: usize, layout: &Layout) -> Result<Frame, LayoutError> {
+    let across = layout.across();
+    let block = Block::of((width / across.max(1), length), layout)?;
+    let ((left, right), (top, bottom)) = (block.columns[0], block.rows[0]);
+    let copy = Rect { left, right, top, bottom };
+    let framed = || {
+        let visible = page::area(layout, copy.meet(block.room))?;
+        let begin = |visible: usize, hidden: i64, period: u16| {
+            let begin = visible as i64 - hidden;
+            u16::try_from(if begin < 0 { begin.rem_euclid(period.into()) } else { begin }).ok()
+        };
+        let across = across as i64;
+        let cut = if layout.mirror { across * (right - left) % i64::from(EDGE) } else { 0 };
+        let x = begin(visible.left, across * (block.room.left - left).max(0) - cut, EDGE)?;
+        let y = begin(visible.top, (block.room.top - top).max(0), 2 * EDGE)?;
+        let reach =
+            |from: usize, length: usize, begin: u16| u16::try_from(from + length).ok()?.checked_sub(begin);
+        let width = reach(visible.left, visible.width, x)?;
+        let height = reach(visible.top, visible.length, y)?;
+        (width > 0 && height > 0).then_some(Frame { x, y, width, height })
+    };
+    let Layout { paper, resolution, .. } = *layout;
+    Ok(framed().unwrap_or(Frame::whole(resolution.across(paper.width()), resolution.along(paper.length()))))
+}
+
 /// Lays a dot map on a page. At 1200 x 600 dpi the sheet is one of custom paper, twice as many dots wide.
 ///
 /// # Errors
@@ -96,14 +128,14 @@ pub fn arrange(dots: &DotMap, layout: &Layout, observer: &dyn Observer) -> Resul
     let marked = layout.crop_marks || layout.registration_marks || layout.camera_marks;
     let in_use = if marked { order::passes_of(&used(dots)) } else { Vec::new() };
     let (marks, marks_left_out) = marks::marks_of(layout, dots, &in_use, &block, &mut stacks)?;
-    let page = Page { dots, layout, block: &block, marks: &marks };
+    let page = IdealPage { dots, layout, block: &block, marks: &marks };
     let sheet = Sheet::new(in_dots(layout.paper, layout.resolution), stacks, page.render(observer))?;
 
     let room = block.room;
     let mut copies = Vec::new();
     for &(top, bottom) in &block.rows {
         for &(left, right) in &block.columns {
-            copies.extend(page.area(Rect { left, right, top, bottom }.meet(room)));
+            copies.extend(page::area(layout, Rect { left, right, top, bottom }.meet(room)));
         }
     }
     let all = marks.iter().fold(block.place, |all, (mark, _)| Rect {
@@ -113,7 +145,7 @@ pub fn arrange(dots: &DotMap, layout: &Layout, observer: &dyn Observer) -> Resul
         bottom: all.bottom.max(mark.place.bottom),
     });
     let nothing = LayoutError::Nothing { paper: layout.paper.name() };
-    let area = page.area(all.meet(room)).filter(|_| !copies.is_empty()).ok_or(nothing)?;
+    let area = page::area(layout, all.meet(room)).filter(|_| !copies.is_empty()).ok_or(nothing)?;
     let laid = Laid { grid: block.grid, marks_left_out, copies, area, cut: block.cut };
     Ok(Arranged { sheet, laid })
 }

@@ -6,18 +6,18 @@ use super::block::Block;
 use super::marks::Mark;
 use super::rect::Rect;
 use super::settings::Layout;
-use crate::sheet::{Area, DotMap};
 use observe::Observer;
+use sheet::{Area, DotMap};
 
 /// The ideal page.
-pub(super) struct Page<'a> {
+pub(super) struct IdealPage<'a> {
     pub dots: &'a DotMap,
     pub layout: &'a Layout,
     pub block: &'a Block,
     pub marks: &'a [(Mark, u8)],
 }
 
-impl Page<'_> {
+impl IdealPage<'_> {
     /// The dots of the sheet, row by row as they are sent.
     pub fn render(&self, observer: &dyn Observer) -> Vec<u8> {
         let width = usize::from(self.layout.paper.width()) * self.layout.across();
@@ -70,29 +70,29 @@ impl Page<'_> {
             }
         }
     }
+}
 
-    /// A rectangle within the room, in dots of the sheet.
-    pub fn area(&self, place: Rect) -> Option<Area> {
-        if place.width() <= 0 || place.length() <= 0 {
-            return None;
-        }
-        let offset = self.layout.profile.offset().0;
-        let sent = i64::from(self.layout.paper.length());
-        // Rows land in order, so the first and the last are found by halving.
-        let first_at = |y: i64| {
-            let (mut low, mut high) = (0, sent);
-            while low < high {
-                let middle = (low + high) / 2;
-                if self.layout.profile.lands_on(middle) < y { low = middle + 1 } else { high = middle }
-            }
-            low
-        };
-        let (top, bottom) = (first_at(place.top), first_at(place.bottom));
-        (top < bottom).then(|| Area {
-            left: self.layout.across() * (place.left - offset) as usize,
-            top: top as usize,
-            width: self.layout.across() * place.width() as usize,
-            length: (bottom - top) as usize,
-        })
+/// A rectangle within the room, in dots of the sheet.
+pub(super) fn area(layout: &Layout, place: Rect) -> Option<Area> {
+    if place.width() <= 0 || place.length() <= 0 {
+        return None;
     }
+    let offset = layout.profile.offset().0;
+    let sent = i64::from(layout.paper.length());
+    // Rows land in order, so the first and the last are found by halving.
+    let first_at = |y: i64| {
+        let (mut low, mut high) = (0, sent);
+        while low < high {
+            let middle = (low + high) / 2;
+            if layout.profile.lands_on(middle) < y { low = middle + 1 } else { high = middle }
+        }
+        low
+    };
+    let (top, bottom) = (first_at(place.top), first_at(place.bottom));
+    (top < bottom).then(|| Area {
+        left: layout.across() * (place.left - offset) as usize,
+        top: top as usize,
+        width: layout.across() * place.width() as usize,
+        length: (bottom - top) as usize,
+    })
 }

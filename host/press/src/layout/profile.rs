@@ -8,7 +8,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::length::Mm;
-use crate::files::{FileError, read_toml, write_toml};
+use files::{FileError, read_toml, write_toml};
 
 /// The largest offset that is a printer's and not a mistake, in millimetres.
 const MOST_OFFSET: f64 = 10.0;

@@ -7,7 +7,7 @@ use protocol::rgl::Resolution;
 use super::length::{Mm, Point};
 use super::profile::Profile;
 use super::rect::{Cut, Rect};
-use crate::sheet::SheetError;
+use sheet::SheetError;
 
 /// Most copies side by side or below each other.
 pub const MOST_REPEATS: u16 = 200;

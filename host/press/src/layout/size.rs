@@ -3,29 +3,14 @@
 //! What comes out is a size in 600 dpi dots. A document keeps its shape; where it lies is the rest of the layout's
 //! business.
 
-use std::fmt;
-use std::str::FromStr;
-
 use protocol::paper::LARGEST;
 
 use super::settings::Layout;
-use crate::sheet::DOTS_PER_MM;
+use sheet::{DOTS_PER_MM, Size};
 
-/// A size on paper as typed: `120x90mm`, `12x9cm`, `5x4in`, or only the width, `120mm`.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Size {
-    /// Width in millimetres.
-    pub width: f64,
-    /// Height in millimetres; the document's shape decides when it is not given.
-    pub height: Option<f64>,
-}
-
-/// Why a size is not one, or not one that can be printed.
+/// Why a document of this size cannot be printed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SizeError {
-    /// Not a size.
-    #[error("`{0}` is not a size; write it like 120x90mm, 12x9cm, 5x4in, or only the width, 120mm")]
-    Text(String),
     /// Larger than the printable area.
     #[error(
         "{width:.1} x {height:.1} mm does not fit; the printable area of {paper} has room for {most_width:.1} x \
@@ -65,36 +50,6 @@ pub enum SizeError {
         /// Height asked for, in mm.
         height: f64,
     },
-}
-
-impl FromStr for Size {
-    type Err = SizeError;
-
-    fn from_str(text: &str) -> Result<Size, SizeError> {
-        let wrong = || SizeError::Text(text.into());
-        let lower = text.trim().to_ascii_lowercase();
-        let (numbers, unit) = [("mm", 1.0), ("cm", 10.0), ("in", 25.4)]
-            .into_iter()
-            .find_map(|(name, mm)| Some((lower.strip_suffix(name)?, mm)))
-            .ok_or_else(wrong)?;
-        let length = |number: &str| -> Result<f64, SizeError> {
-            let value: f64 = number.trim().parse().map_err(|_| wrong())?;
-            if value.is_finite() && value > 0.0 { Ok(value * unit) } else { Err(wrong()) }
-        };
-        match numbers.split_once('x') {
-            Some((width, height)) => Ok(Size { width: length(width)?, height: Some(length(height)?) }),
-            None => Ok(Size { width: length(numbers)?, height: None }),
-        }
-    }
-}
-
-impl fmt::Display for Size {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.height {
-            Some(height) => write!(f, "{}x{}mm", self.width, height),
-            None => write!(f, "{}mm", self.width),
-        }
-    }
 }
 
 /// Dots across and down of a document of `pixels` (width, height) on a page of this layout.
@@ -150,16 +105,6 @@ pub fn dots(
 mod tests {
     use super::*;
     use protocol::paper::Paper;
-
-    #[test]
-    fn sizes_are_read_with_their_unit_and_refused_without() {
-        assert_eq!("120x90mm".parse(), Ok(Size { width: 120.0, height: Some(90.0) }));
-        assert_eq!("5 x 4 in".parse(), Ok(Size { width: 127.0, height: Some(101.6) }));
-        assert_eq!("12cm".parse(), Ok(Size { width: 120.0, height: None }));
-        for wrong in ["", "120", "mm", "0mm", "-3mm", "axbmm", "1x2x3mm", "infmm", "nanmm"] {
-            assert!(wrong.parse::<Size>().is_err(), "{wrong}");
-        }
-    }
 
     fn on_a4(
         pixels: (usize, usize),

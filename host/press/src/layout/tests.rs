@@ -17,7 +17,7 @@ fn dots(across: i64, down: i64) -> Point {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(300))]
+    #![proptest_config(testing::cases(300))]
     /// Every dot of the page against a walk over all copies, with nothing shared but the numbers.
     #[test]
     fn every_dot_is_that_of_the_copy_that_covers_it(

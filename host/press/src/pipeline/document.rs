@@ -7,25 +7,26 @@ use std::borrow::Cow;
 
 use inks::{InkSet, Library};
 
-use crate::halftone::{self, HalftoneError, halftone};
-use crate::layout::{self, Layout, LayoutError, Size, SizeError, size};
+use crate::layout::{self, Layout, LayoutError, SizeError, size};
 use crate::preview::{EYE, spot_mm};
-use crate::sheet::{DOTS_PER_MM, DotMap};
 use appearance::document::{Document, Materials};
 use appearance::factor::{self, FactorError, Factored};
-use appearance::gamut::{self, Doubt, Gain, GamutError, Mapped, Printable};
+use appearance::gamut::{self, DistanceUncertainty, Gain, GamutError, Mapped, Printable};
 use appearance::materials::{Reduced, resolution};
 use appearance::weights::WeightError;
+use halftone::{HalftoneError, halftone};
 use observe::Observer;
 use protocol::ink::Ink;
+use sheet::Size;
+use sheet::{DOTS_PER_MM, DotMap};
 
 /// What the user may choose.
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// How the document is factored.
-    pub factor: factor::Settings,
+    pub factor: factor::FactorSettings,
     /// How it is mapped to the printer's gamut.
-    pub gamut: gamut::Settings,
+    pub gamut: gamut::GamutSettings,
     /// The inks at hand.
     pub inks: InkSet,
     /// How dots are chosen.
@@ -37,7 +38,7 @@ pub struct Settings {
 /// A document as dots, and what it went through.
 pub struct Halftoned {
     /// What the factoring reports; absent when the document came factored, or the intent uses no bases.
-    pub factoring: Option<factor::Report>,
+    pub factoring: Option<factor::FactorReport>,
     /// The mixture of stacks, and what the mapping reports.
     pub mapped: Mapped,
     /// The dots.
@@ -46,7 +47,7 @@ pub struct Halftoned {
     pub foils: Option<Gain>,
     /// How much of the distance between document and mixture lies within the measurement of the stacks, if one in use has
     /// standard deviations.
-    pub doubt: Option<Doubt>,
+    pub doubt: Option<DistanceUncertainty>,
 }
 
 /// Why a document does not become dots: the error of the stage that refused.
@@ -121,8 +122,10 @@ pub fn halftoned(
             Ok::<_, StageError>(Cow::Owned(factored))
         }
     };
-    let mapping =
-        gamut::Settings { eye: spot(width, materials.width(), settings.halftone), ..settings.gamut.clone() };
+    let mapping = gamut::GamutSettings {
+        eye: spot(width, materials.width(), settings.halftone),
+        ..settings.gamut.clone()
+    };
     let mapped = gamut::map(materials, bases, &printable, &mapping, observer)?;
     // The automatic choice may have tried bases that it does not use.
     let factoring = factoring.filter(|_| mapped.report.intent.uses_bases());
@@ -138,7 +141,7 @@ pub fn halftoned(
         true => foils(materials, library, &printable, &mapped, &settings.gamut)?,
         false => None,
     };
-    let doubt = gamut::doubt(materials, &mapped.mix, library, settings.gamut.seed);
+    let doubt = gamut::distance_uncertainty(materials, &mapped.mix, library, settings.gamut.seed);
     Ok(Halftoned { factoring, mapped, dots, foils, doubt })
 }
 
@@ -168,7 +171,7 @@ fn foils(
     library: &Library,
     printable: &Printable,
     mapped: &Mapped,
-    settings: &gamut::Settings,
+    settings: &gamut::GamutSettings,
 ) -> Result<Option<Gain>, GamutError> {
     let all = InkSet::of(InkSet::default().iter().chain([Ink::SilverFoil, Ink::GoldFoil]));
     let more = Printable::combined(library, &all, materials.space());
@@ -198,9 +201,9 @@ fn cells(
 /// Those of the factoring.
 pub fn factored<'a>(
     document: &'a Document,
-    settings: &factor::Settings,
+    settings: &factor::FactorSettings,
     observer: &dyn Observer,
-) -> Result<(Cow<'a, Factored>, Option<factor::Report>), FactorError> {
+) -> Result<(Cow<'a, Factored>, Option<factor::FactorReport>), FactorError> {
     if let Some(factored) = document.as_factored() {
         return Ok((Cow::Borrowed(factored), None));
     }

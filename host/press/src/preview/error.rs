@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::sheet::Area;
+use sheet::Area;
 
 /// The longest side of any picture, in pixels: larger than every sheet in dots.
 pub const LONGEST_SIDE: usize = 8192;

@@ -11,10 +11,10 @@
 
 use rayon::prelude::*;
 
-use crate::sheet::DOTS_PER_MM;
 use appearance::brdf::Space;
 use appearance::wide::wide;
 use observe::Observer;
+use sheet::DOTS_PER_MM;
 
 use super::error::PreviewError;
 use super::source::{Lines, Scratch, Source};
@@ -27,7 +27,7 @@ const SAMPLES: usize = 64;
 
 /// Distances between two pictures over all spots that the eye resolves. 0.01 is barely visible, 0.05 is obvious.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Report {
+pub struct FidelityReport {
     /// Mean distance.
     pub mean: f64,
     /// Root of the mean squared distance.
@@ -73,7 +73,7 @@ pub fn fidelity(
     size: (usize, usize),
     metres: f64,
     observer: &dyn Observer,
-) -> Result<Report, PreviewError> {
+) -> Result<FidelityReport, PreviewError> {
     let space = target.space();
     if print.space() != space {
         return Err(PreviewError::Shape {
@@ -120,7 +120,7 @@ pub fn fidelity(
     let mut sorted = map.clone();
     sorted.sort_unstable_by(f32::total_cmp);
     let at = |share: f64| f64::from(sorted[((sorted.len() - 1) as f64 * share).round() as usize]);
-    Ok(Report { mean, rmse, p95: at(0.95), max: at(1.0), light_rmse, width, height, map })
+    Ok(FidelityReport { mean, rmse, p95: at(0.95), max: at(1.0), light_rmse, width, height, map })
 }
 
 /// [`appearance::brdf::Space::distance`] for rows of f32, eight columns at a time. The order of sums is fixed.
@@ -201,13 +201,13 @@ fn blurred(lines: &Lines, first: usize, count: usize) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sheet::{Area, Sheet};
     use appearance::brdf::Table;
     use appearance::document::Materials;
     use inks::Stack;
     use observe::Silent;
     use proptest::prelude::*;
     use protocol::paper::Paper;
+    use sheet::{Area, Sheet};
 
     /// A document with one row everywhere.
     struct Uniform(Space, Vec<f64>);
@@ -245,7 +245,7 @@ mod tests {
         .unwrap()
     }
 
-    fn report(space: &Space, rows: &Table, target: Vec<f64>, sheet: &Sheet, metres: f64) -> Report {
+    fn report(space: &Space, rows: &Table, target: Vec<f64>, sheet: &Sheet, metres: f64) -> FidelityReport {
         let target = Uniform(space.clone(), target);
         let print =
             Source::Print { dots: sheet.dots(), space, stacks: rows, area: Area::whole(sheet.dots()) };

@@ -162,11 +162,11 @@ impl Curves {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sheet::{Area, Sheet};
     use appearance::brdf::Table;
     use inks::{Curve, Stack};
     use observe::Silent;
     use protocol::paper::Paper;
+    use sheet::{Area, Sheet};
     use std::f64::consts::PI;
 
     /// A sheet of two stacks, the second on every dot where `inked` says so.

@@ -10,11 +10,11 @@ use std::str::FromStr;
 
 use image::RgbImage;
 
-use crate::files::FileError;
 use crate::separate::Pass;
-use crate::sheet::colours::{label, upon};
-use crate::sheet::picture::{Kind, write_png};
-use crate::sheet::{Area, Sheet};
+use files::FileError;
+use sheet::colours::{label, upon};
+use sheet::picture::{Kind, write_png};
+use sheet::{Area, Sheet};
 
 /// A background to print on, sRGB.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -203,8 +203,7 @@ mod tests {
     fn a_pass_shows_its_own_dots_only() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("pass.png");
-        let plane =
-            crate::separate::Plane { width: 20, length: 2, stride: 3, bits: vec![0, 0x18, 0, 0x80, 0, 0x10] };
+        let plane = sheet::Plane { width: 20, length: 2, stride: 3, bits: vec![0, 0x18, 0, 0x80, 0, 0x10] };
         let area = Area { left: 4, top: 0, width: 16, length: 2 };
         save_pass(&Pass { ink: Ink::White, plane }, area, 1, Ground([0; 3]), &path).unwrap();
         let picture = image::open(&path).unwrap().to_rgb8();
@@ -220,8 +219,7 @@ mod tests {
         for (x, y) in [1, 2].into_iter().flat_map(|y| (5..9).map(move |x| (x, y))) {
             bits[y * 3 + x / 8] |= 0x80 >> (x % 8);
         }
-        let pass =
-            Pass { ink: Ink::White, plane: crate::separate::Plane { width: 20, length: 5, stride: 3, bits } };
+        let pass = Pass { ink: Ink::White, plane: sheet::Plane { width: 20, length: 5, stride: 3, bits } };
         let area = Area { left: 4, top: 0, width: 12, length: 4 };
         let small = pass_thumbnail(&pass, area, 1, Ground([0; 3]), 6);
         assert_eq!(small.dimensions(), (6, 2));

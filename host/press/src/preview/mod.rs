@@ -10,15 +10,11 @@
 //! [`Panels`] and [`materials_picture()`] lay the results out.
 
 mod canvas;
-#[cfg(test)]
-mod document_table;
 mod error;
 mod fidelity;
 mod fine;
 mod flat;
 pub mod inks;
-#[cfg(test)]
-mod light_table;
 mod light_tree;
 mod materials_picture;
 mod probe;
@@ -32,7 +28,7 @@ mod wear;
 
 pub use canvas::picture;
 pub use error::{LONGEST_SIDE, PreviewError};
-pub use fidelity::{EYE, Report, fidelity, spot_mm};
+pub use fidelity::{EYE, FidelityReport, fidelity, spot_mm};
 pub use fine::{ENTRIES, Fine};
 pub use flat::{Light, flat};
 pub use materials_picture::{Swatch, materials_picture, mix_in_words};

@@ -7,12 +7,10 @@
 //! Source of files: Radiance `.hdr` (RGBE) and OpenEXR, decoded within limits.
 
 use std::f64::consts::PI;
-use std::io::{BufRead, BufReader, Seek};
 use std::path::Path;
 
-use image::codecs::hdr::HdrDecoder;
-use image::codecs::openexr::OpenExrDecoder;
-use image::{DynamicImage, ImageDecoder, Limits};
+use image::ImageFormat;
+use pictures::{Bounds, Opened};
 
 use super::error::PreviewError;
 
@@ -20,6 +18,8 @@ use super::error::PreviewError;
 const WIDEST: usize = 8192;
 /// The fewest rows that a panorama is rendered with: texels of 2.8 degrees.
 const FEWEST: usize = 64;
+/// The most memory: that of the widest in four channels of four bytes.
+const BOUNDS: Bounds = Bounds { side: None, bytes: 512 << 20 };
 /// The first bytes of an OpenEXR file.
 const OPEN_EXR: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
@@ -76,41 +76,35 @@ impl Probe {
     /// # Errors
     /// A file that cannot be read, or is not a panorama twice as wide as high.
     pub fn read(path: &Path) -> Result<Probe, PreviewError> {
-        let file = std::fs::File::open(path)
-            .map_err(|e| PreviewError::Probe { path: path.to_path_buf(), problem: e.to_string() })?;
-        Probe::from_file(BufReader::new(file), path)
+        let wrong = |problem: String| PreviewError::Probe { path: path.to_path_buf(), problem };
+        let bytes = std::fs::read(path).map_err(|e| wrong(e.to_string()))?;
+        Probe::from_bytes(&bytes).map_err(wrong)
     }
 
-    /// Reads a panorama from any input; errors name `path`.
-    fn from_file(mut input: impl BufRead + Seek, path: &Path) -> Result<Probe, PreviewError> {
-        let wrong = |problem: String| PreviewError::Probe { path: path.to_path_buf(), problem };
-        if input.fill_buf().map_err(|e| wrong(e.to_string()))?.starts_with(&OPEN_EXR) {
-            let decoder = OpenExrDecoder::new(input).map_err(|e| wrong(e.to_string()))?;
-            return Probe::decoded(decoder, 1.0).map_err(wrong);
+    /// Reads a panorama, or says what is wrong with it.
+    fn from_bytes(bytes: &[u8]) -> Result<Probe, String> {
+        if bytes.starts_with(&OPEN_EXR) {
+            let opened = pictures::open(bytes, ImageFormat::OpenExr, BOUNDS).map_err(|e| e.to_string())?;
+            return Probe::decoded(opened, 1.0);
         }
-        let decoder = HdrDecoder::new(input).map_err(|e| wrong(e.to_string()))?;
+        let (opened, exposure) = pictures::open_radiance(bytes, BOUNDS).map_err(|e| e.to_string())?;
         // The program that wrote the file multiplied the pixels by the exposure in the header.
-        let exposure = decoder.metadata().exposure.unwrap_or(1.0);
         if !(exposure.is_finite() && exposure > 0.0) {
-            return Err(wrong(format!("EXPOSURE={exposure} must be above 0")));
+            return Err(format!("EXPOSURE={exposure} must be above 0"));
         }
-        Probe::decoded(decoder, exposure).map_err(wrong)
+        Probe::decoded(opened, exposure)
     }
 
     /// The panorama of a picture whose values were multiplied by `exposure`; or what is wrong with it.
-    fn decoded(mut decoder: impl ImageDecoder, exposure: f32) -> Result<Probe, String> {
-        let (width, height) = decoder.dimensions();
+    fn decoded(opened: Opened<'_>, exposure: f32) -> Result<Probe, String> {
+        let (width, height) = opened.size();
         let (width, height) = (width as usize, height as usize);
         if width == 0 || height == 0 || width > WIDEST || width != 2 * height {
             return Err(format!(
                 "{width} x {height} pixels; it must be twice as wide as high and at most {WIDEST} wide"
             ));
         }
-        let mut limits = Limits::default();
-        limits.max_image_width = Some(WIDEST as u32);
-        limits.max_image_height = Some(WIDEST as u32);
-        decoder.set_limits(limits).map_err(|e| e.to_string())?;
-        let image = DynamicImage::from_decoder(decoder).map_err(|e| e.to_string())?.into_rgb32f();
+        let image = opened.decode().map_err(|e| e.to_string())?.into_rgb32f();
         let rgb: Vec<[f32; 3]> = image.pixels().map(|p| p.0.map(|v| v / exposure)).collect();
         if let Some(i) = rgb.iter().position(|texel| !texel.iter().all(lightens)) {
             return Err(format!(
@@ -317,7 +311,10 @@ mod tests {
     }
 
     fn read(bytes: Vec<u8>) -> Result<Probe, PreviewError> {
-        Probe::from_file(Cursor::new(bytes), Path::new("env.hdr"))
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("env.hdr");
+        std::fs::write(&path, bytes).unwrap();
+        Probe::read(&path)
     }
 
     #[test]

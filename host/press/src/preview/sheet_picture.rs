@@ -5,8 +5,8 @@
 
 use image::RgbImage;
 
-use crate::sheet::{Area, DotMap};
 use observe::Observer;
+use sheet::{Area, DotMap};
 
 use super::canvas::{Canvas, FAINT, INK, Letters, shortened};
 use super::error::{PreviewError, check_size};
@@ -150,11 +150,11 @@ fn most_varied(dots: &DotMap, area: Area, width: usize, length: usize) -> Area {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sheet::Sheet;
     use appearance::brdf::{Space, Table};
     use inks::Stack;
     use observe::Silent;
     use protocol::paper::Paper;
+    use sheet::Sheet;
 
     #[test]
     fn the_same_sheet_twice_gives_the_same_row_twice() {

@@ -11,12 +11,12 @@
 
 use rayon::prelude::*;
 
-use crate::sheet::{Area, DotMap};
 use appearance::brdf::{Space, Table};
 use appearance::document::Materials;
 use appearance::factor::Factored;
 use appearance::materials::Cover;
 use appearance::weights::ONE;
+use sheet::{Area, DotMap};
 
 use super::error::{PreviewError, check_size};
 
@@ -312,11 +312,11 @@ impl<'a> Lines<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sheet::Sheet;
     use appearance::weights::{WeightMaps, quantise};
     use inks::Stack;
     use proptest::prelude::*;
     use protocol::paper::Paper;
+    use sheet::Sheet;
 
     proptest! {
         #[test]

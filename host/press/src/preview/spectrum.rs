@@ -11,10 +11,8 @@
 use std::f64::consts::TAU;
 
 use rayon::prelude::*;
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex;
 
-use crate::sheet::{DOTS_PER_MM, DotMap};
+use sheet::{DOTS_PER_MM, DotMap};
 
 /// Side of a window in dots.
 const WINDOW: usize = 256;
@@ -100,20 +98,15 @@ fn rings(window: &[f64], side: usize) -> Vec<(f64, u32)> {
     let hann = |i: usize| 0.5 - 0.5 * (TAU * (i as f64 + 0.5) / side as f64).cos();
     let bell: Vec<f64> = (0..side).map(hann).collect();
     let value = |i: usize| (window[i] - mean) * bell[i % side] * bell[i / side];
-    let mut plane: Vec<Complex<f32>> =
-        (0..window.len()).map(|i| Complex::new(value(i) as f32, 0.0)).collect();
-    let fft = FftPlanner::new().plan_fft_forward(side);
-    fft.process(&mut plane);
-    let mut turned: Vec<Complex<f32>> = (0..plane.len()).map(|i| plane[i % side * side + i / side]).collect();
-    fft.process(&mut turned);
+    let values: Vec<f64> = (0..window.len()).map(value).collect();
     let mut sums = vec![(0.0, 0); RINGS + 1];
-    for (i, power) in turned.iter().enumerate().skip(1) {
+    for (i, power) in spectra::power(&values, side).into_iter().enumerate().skip(1) {
         let cycles = |at: usize| at.min(side - at) as f64 / side as f64;
         let radius = cycles(i % side).hypot(cycles(i / side));
         let ring = ((2.0 * radius * RINGS as f64) as usize).min(RINGS);
         // The window smears frequency 0 over its neighbours.
         if radius * side as f64 > 2.0 {
-            sums[ring].0 += f64::from(power.norm_sqr());
+            sums[ring].0 += f64::from(power);
             sums[ring].1 += 1;
         }
     }

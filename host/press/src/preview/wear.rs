@@ -17,9 +17,10 @@ use inks::Stack;
 use protocol::ink::Ink;
 use rayon::prelude::*;
 
-use crate::separate::{MOST_PASSES, SeparateError, passes};
-use crate::sheet::{DOTS_PER_MM, DotMap};
+use crate::separate::{SeparateError, passes};
 use crate::split_mix::nth;
+use sheet::MOST_PASSES;
+use sheet::{DOTS_PER_MM, DotMap};
 
 /// How worn a printer is. The default is a new one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

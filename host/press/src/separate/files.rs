@@ -9,10 +9,11 @@ use protocol::paper::Paper;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{MOST_PASSES, Pass, Plane, Separation};
-use crate::files::{FileError, read_toml, write_toml};
-use crate::sheet::files::{PaperText, check_format};
-use crate::sheet::picture::{Kind, SIGNATURE, read_png, write_png};
+use super::{Pass, Separation};
+use files::{FileError, read_toml, write_toml};
+use sheet::files::{PaperText, check_format};
+use sheet::picture::{Kind, SIGNATURE, read_png, write_png};
+use sheet::{MOST_PASSES, Plane};
 
 /// The text beside the pictures.
 pub(super) const TEXT: &str = "passes.toml";
@@ -98,7 +99,7 @@ pub fn load(folder: &Path) -> Result<Saved, FileError> {
     let wrong = |problem: String| FileError::Text { path: path.clone(), problem };
     check_format(text.format, FORMAT).map_err(wrong)?;
     let paper = text.paper.paper().map_err(wrong)?;
-    crate::sheet::check_stacks(&text.stacks).map_err(|error| wrong(format!("stacks: {error}")))?;
+    sheet::check_stacks(&text.stacks).map_err(|error| wrong(format!("stacks: {error}")))?;
     if text.passes.len() > MOST_PASSES {
         return Err(wrong(format!("pass: {} passes, at most {MOST_PASSES}", text.passes.len())));
     }

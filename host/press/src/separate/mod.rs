@@ -2,12 +2,11 @@
 //!
 //! Problem: a stack is several layers, a pass is one ink over the whole page, and a page should take few passes.
 //! Method: the shortest list of inks in which every stack in use finds its layers in order (`sheet::order`), one plane
-//! for each (`pack`), the rules on stacks and pages as checks (`rules`). Overlap is wanted: a dot is in as many passes as
+//! for each ([`pack`]), the rules on stacks and pages as checks (`rules`). Overlap is wanted: a dot is in as many passes as
 //! its stack has layers. [`compose`] is the way back.
 //! Cost: one pass over the dots for all planes. Limits: `MOST_PASSES` passes, `MOST_LAYERS` layers.
 
 pub mod files;
-pub(crate) mod pack;
 mod passes;
 mod rules;
 
@@ -17,11 +16,11 @@ use inks::{Rule, Severity, Stack};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 
-use crate::sheet::{Sheet, SheetError, order};
 use observe::Observer;
+use sheet::{MOST_PASSES, Plane, Sheet, SheetError, order, pack};
 
-pub use passes::{MOST_CARTRIDGES, Pass, Plan, Plane, Planned};
-pub(crate) use passes::{MOST_LAYERS, MOST_PASSES};
+pub(crate) use passes::MOST_LAYERS;
+pub use passes::{MOST_CARTRIDGES, Pass, Plan, Planned};
 pub use rules::{CARTRIDGES, Check};
 
 /// A sheet ready for the printer's language.
@@ -216,7 +215,7 @@ pub fn compose(paper: Paper, passes: &[Pass], stacks: &[Stack]) -> Result<Sheet,
             });
         }
     }
-    crate::sheet::check_stacks(stacks)?;
+    sheet::check_stacks(stacks)?;
     let numbers: HashMap<&[Ink], u16> =
         stacks.iter().zip(0..).map(|(stack, q)| (stack.layers(), q)).collect();
     let layers = |mask: usize| -> Vec<Ink> {

@@ -17,8 +17,8 @@ use protocol::ink::Kind;
 use serde::Serialize;
 
 use super::passes::{MOST_CARTRIDGES, Plan};
-use crate::sheet::clusters::{Touch, smallest_clusters};
-use crate::sheet::{Sheet, dots_in_words};
+use sheet::clusters::{Touch, smallest_clusters};
+use sheet::{Sheet, dots_in_words};
 
 /// A rule that a sheet touches.
 #[derive(Clone, Debug, PartialEq, Serialize)]

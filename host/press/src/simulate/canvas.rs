@@ -3,7 +3,7 @@
 use protocol::packbits;
 use protocol::rgl::Compression;
 
-use crate::separate::Plane;
+use sheet::Plane;
 
 /// The plane of a pass during printing: the declared page at the job's resolution.
 #[derive(Clone, Debug)]

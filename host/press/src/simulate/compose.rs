@@ -15,7 +15,7 @@ use protocol::paper::Paper;
 use rayon::prelude::*;
 
 use crate::separate::Pass;
-use crate::sheet::{Sheet, SheetError};
+use sheet::{Sheet, SheetError};
 
 /// Why a printout cannot become a [`Sheet`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -141,7 +141,7 @@ impl Group<'_> {
 /// it, the substrate comes first, then the stacks that occur, in the order of the passes that make them.
 pub(super) fn sheet(paper: Paper, passes: &[Pass], known: Option<&[Stack]>) -> Result<Sheet, PrintoutError> {
     let (width, length) = (usize::from(paper.width()), usize::from(paper.length()));
-    let passes: Vec<&Pass> = passes.iter().filter(|pass| pass.plane.bits.iter().any(|&b| b != 0)).collect();
+    let passes: Vec<&Pass> = passes.iter().filter(|pass| !pass.plane.is_blank()).collect();
     let mut index = vec![0u8; width * length];
     let mut stacks = vec![Stack::SUBSTRATE];
     let groups = passes.chunks(8).count();

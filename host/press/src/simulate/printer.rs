@@ -268,7 +268,7 @@ impl Printer {
         let declared = order.declared();
         let resolution = declared.resolution.unwrap_or_default();
         let dpi = resolution.dpi();
-        let code = declared.paper.unwrap_or(PaperCode::of(Paper::A4));
+        let code = declared.paper.unwrap_or(PaperCode::from_paper(Paper::A4));
         let paper = code.paper(from_dots(declared.width, dpi.0), from_dots(declared.length, dpi.1));
         let position = code.top().into();
         let printout = Printout {

@@ -7,7 +7,7 @@ use protocol::rgl::{Media, Resolution};
 use super::compose::{self, PrintoutError};
 use crate::layout::in_dots;
 use crate::separate::Pass;
-use crate::sheet::Sheet;
+use sheet::Sheet;
 
 /// A printed sheet.
 #[derive(Clone, Debug, PartialEq, Eq)]

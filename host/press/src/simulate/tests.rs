@@ -8,10 +8,11 @@ use protocol::rgl::{Command, Compression, Fault, Media, Mode, Page, PaperCode, R
 
 use super::*;
 use crate::job::stream::write_job;
-use crate::separate::{Pass, Plane};
-use crate::sheet::Sheet;
+use crate::separate::Pass;
 use inks::Stack;
 use observe::Silent;
+use sheet::Plane;
+use sheet::Sheet;
 
 const SMALL: Paper = Paper::Custom { width: 100, length: 80 };
 
@@ -72,7 +73,7 @@ fn raw(resolution: Resolution, width: u16, ink: Ink, row: &[u8]) -> Vec<u8> {
         Command::SelectRgl,
         Command::Resolution(resolution),
         Command::Media(Media::Plain),
-        Command::Paper(PaperCode::of(SMALL)),
+        Command::Paper(PaperCode::from_paper(SMALL)),
         Command::Length(80),
         Command::Width(width),
         Command::CurlCorrection(true),
@@ -407,7 +408,7 @@ fn pages() -> impl Strategy<Value = (Paper, Vec<Ink>, Vec<u32>)> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+    #![proptest_config(testing::cases(48))]
 
     #[test]
     fn the_sheet_that_was_sent_comes_out_dot_for_dot((paper, inks, sets) in pages()) {
@@ -423,11 +424,11 @@ proptest! {
             known.unwrap_or_else(|| { stacks.push(stack); stacks.len() - 1 }) as u8
         }).collect();
         let sent = Sheet::new(paper, stacks, index).unwrap();
-        prop_assume!(passes.iter().any(|pass| pass.plane.bits.iter().any(|&b| b != 0)));
+        prop_assume!(passes.iter().any(|pass| !pass.plane.is_blank()));
 
         let printout = print(&job(paper, &passes), &Setup::default(), &Silent).unwrap();
         let printing: Vec<Pass> =
-            passes.into_iter().filter(|pass| pass.plane.bits.iter().any(|&b| b != 0)).collect();
+            passes.into_iter().filter(|pass| !pass.plane.is_blank()).collect();
         prop_assert_eq!(&printout.passes, &printing);
         let sheet = printout.sheet().unwrap();
         prop_assert_eq!(difference(&sent, &sheet), None);

@@ -3,7 +3,6 @@
 //! Waits without limit for the bridge and the operator, unless the queue belongs to a class and another printer may do the job.
 
 use std::cell::{Cell, RefCell};
-use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -12,9 +11,10 @@ use protocol::status;
 
 use crate::queue::messages::{Messages, Reason};
 use device::deliver::{Caller, Cartridges, Failure, News, Question};
-use device::send::cartridges::Found;
-use device::send::journal::PassPlace;
-use device::send::{Event, Wish, words};
+use device::forms::PassPlace;
+use device::questions::cartridges::Found;
+use device::transit::{Event, Wish, words};
+use files::durable::{self, Access};
 use observe::Observer;
 
 /// How long a cancelled job may take to come to its end; the print system kills after 30 s.
@@ -235,10 +235,10 @@ impl<W: Write + Send> Caller for System<'_, W> {
     }
 }
 
-/// Makes an empty file, durably.
+/// Makes an empty file, durably, for this user alone.
 pub(super) fn put(path: &Path) -> io::Result<()> {
     if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder)?;
+        durable::make_folder(folder)?;
     }
-    File::create(path)?.sync_all()
+    durable::write(path, &[], Access::Private)
 }

@@ -4,11 +4,11 @@ use std::io::{self, BufRead as _, BufReader};
 use std::path::Path;
 use std::process::{ChildStdout, Stdio};
 
-use press::layers::Page;
-use press::layers::kinds::{self, Order};
-use press::layers::pdf::{self, Interpreter, conversion};
-use press::process::{self, Process, ProcessError};
-use press::scratch::Scratch;
+use art::Page;
+use art::kinds::{self, Order};
+use art::pdf::{self, Interpreter, conversion};
+use art::process::{self, Process, ProcessError};
+use files::scratch::Scratch;
 
 use super::{FilterError, io_error};
 

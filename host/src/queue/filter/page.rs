@@ -9,9 +9,9 @@ use protocol::paper::{LEFT, Paper};
 use super::{FilterError, io_error};
 use crate::queue::options::{Choices, Place, Spots};
 use crate::queue::ppd;
+use art::{Artwork, Window};
 use observe::Observer;
 use press::job::Handling;
-use press::layers::{self, Artwork, Window};
 use press::layout::{Cut, Layout, Mm, Point, Position};
 use press::pipeline::{self, JobError, Request};
 use press::separate::CARTRIDGES;
@@ -40,7 +40,7 @@ impl Press<'_> {
 
     /// Notes that no page of the document has the reserved white that was asked for.
     pub(super) fn without_white(&self) {
-        if self.choices.white == layers::White::Reserved && self.jobs > 0 && self.white == 0 {
+        if self.choices.white == art::White::Reserved && self.jobs > 0 && self.white == 0 {
             self.observer.note(
                 "FoilpressWhite=Reserved: no page has the reserved white, so none is printed; draw what is to be white in \
                  exactly 230,230,230 without shading or smooth edges, or choose another FoilpressWhite",
@@ -49,41 +49,41 @@ impl Press<'_> {
     }
 
     /// How a page is read, drawn at so many pixels an inch.
-    pub(super) fn options(&self, dpi: u16) -> layers::Options {
+    pub(super) fn options(&self, dpi: u16) -> art::Options {
         let choices = self.choices;
         let mut reserved = InkSet::EMPTY;
         if choices.spots == Spots::Reserved {
-            reserved = layers::Options::default().inks;
-        } else if choices.white == layers::White::Reserved {
+            reserved = art::Options::default().inks;
+        } else if choices.white == art::White::Reserved {
             reserved = reserved.with(Ink::White);
         }
-        layers::Options {
+        art::Options {
             dpi: Some(dpi.into()),
             reserved: !reserved.is_empty(),
             inks: reserved,
-            ..layers::Options::default()
+            ..art::Options::default()
         }
     }
 
     /// How its layers become stacks.
-    fn settings(&self) -> layers::Settings {
+    fn settings(&self) -> art::Settings {
         let choices = self.choices;
         let spots = Ink::ALL.into_iter().filter(|ink| match ink.kind() {
             Kind::Process => choices.colours.contains(*ink),
             Kind::Foil => choices.foils,
             _ => true,
         });
-        layers::Settings {
+        art::Settings {
             inks: InkSet::of(spots),
             // What the page itself draws in white or finish is printed whatever is chosen.
             // Its reserved white is a layer of it, see `options`.
             white: Some(choices.white)
-                .filter(|white| !matches!(white, layers::White::None | layers::White::Reserved)),
-            finish: Some(choices.finish).filter(|&finish| finish != layers::Finish::None),
+                .filter(|white| !matches!(white, art::White::None | art::White::Reserved)),
+            finish: Some(choices.finish).filter(|&finish| finish != art::Finish::None),
             intent: choices.intent,
             gamma: choices.gamma,
             halftone: choices.halftone,
-            ..layers::Settings::default()
+            ..art::Settings::default()
         }
     }
 
@@ -102,7 +102,7 @@ impl Press<'_> {
             return None;
         };
         // A page is turned about its middle, not what is drawn on it.
-        let whole = mirrored || self.choices.finish == layers::Finish::All;
+        let whole = mirrored || self.choices.finish == art::Finish::All;
         let view = View::of(self.choices.place, paper, (size, dpi), drawn, whole);
         if view.is_none() {
             self.observer.note(&format!(
@@ -128,12 +128,12 @@ impl Press<'_> {
         }
         if art.layers.iter().any(|layer| layer.ink == Ink::White) {
             self.white += 1;
-        } else if self.choices.white == layers::White::Reserved {
+        } else if self.choices.white == art::White::Reserved {
             self.observer.note(&format!(
                 "page {number}: nothing has the reserved white 230,230,230; no white is printed"
             ));
         }
-        let composed = layers::compose(art, &settings, self.library, self.observer)
+        let composed = art::compose(art, &settings, self.library, self.observer)
             .map_err(|source| FilterError::Layers { page: number, source })?;
         for suggestion in &composed.suggestions {
             self.observer.note(&format!("page {number}: {}", suggestion.text));

@@ -40,7 +40,7 @@ impl Frame {
     ///
     /// # Errors
     /// An image of another shape.
-    pub fn of(grid: &Grid, image: &dyn Materials, library: &Library) -> Result<Frame, DisplayError> {
+    pub fn for_image(grid: &Grid, image: &dyn Materials, library: &Library) -> Result<Frame, DisplayError> {
         let found = (image.width(), image.height());
         if found != grid.pixels() {
             return Err(DisplayError::Shape { image: found, display: grid.pixels() });

@@ -9,7 +9,7 @@
 
 use appearance::brdf::{Space, reflectances};
 use inks::{Library, Stack};
-use press::sheet::{DOTS_PER_MM, DotMap};
+use sheet::{DOTS_PER_MM, DotMap};
 
 use super::{DisplayError, MOST_STACKS, Screen};
 

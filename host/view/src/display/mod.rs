@@ -35,7 +35,7 @@ mod seen;
 mod solve;
 
 use inks::Stack;
-use press::sheet::SheetError;
+use sheet::SheetError;
 
 use crate::error::ViewError;
 

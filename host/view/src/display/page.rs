@@ -11,8 +11,8 @@ use appearance::document::SAMPLES;
 use inks::Library;
 use press::html;
 use press::preview::ToneCurve;
-use press::sheet::{DOTS_PER_MM, colours};
 use serde_json::json;
+use sheet::{DOTS_PER_MM, colours};
 
 use super::grid::MARGIN;
 use super::{DisplayError, Frame, Grid, Placed};

@@ -5,12 +5,15 @@ use std::path::Path;
 use appearance::brdf::Space;
 use appearance::materials::Materials;
 use appearance::srgb::decode;
-use image::{ImageReader, Limits};
+use pictures::Bounds;
 
 use super::DisplayError;
 
 /// The longest side of a picture in pixels.
 const LONGEST: u32 = 16_384;
+
+/// What decoding it may use.
+const BOUNDS: Bounds = Bounds { side: Some(LONGEST), bytes: 1 << 30 };
 
 /// Whether a file is a plain picture by its name.
 pub fn is_picture(path: &Path) -> bool {
@@ -34,14 +37,9 @@ impl Matte {
     /// A file that is no picture, or a larger one than is read.
     pub fn read(path: &Path, space: Space) -> Result<Matte, DisplayError> {
         let bad = |problem: String| DisplayError::Picture(format!("{}: {problem}", path.display()));
-        let mut reader = ImageReader::open(path)
-            .and_then(ImageReader::with_guessed_format)
-            .map_err(|error| bad(format!("cannot be read: {error}")))?;
-        let mut limits = Limits::default();
-        (limits.max_image_width, limits.max_image_height) = (Some(LONGEST), Some(LONGEST));
-        limits.max_alloc = Some(1 << 30);
-        reader.limits(limits);
-        let image = reader.decode().map_err(|error| match error {
+        let bytes = std::fs::read(path).map_err(|error| bad(format!("cannot be read: {error}")))?;
+        let decoded = || pictures::open(&bytes, image::guess_format(&bytes)?, BOUNDS)?.decode();
+        let image = decoded().map_err(|error| match error {
             image::ImageError::Limits(_) => {
                 bad(format!("the picture is too large; at most {LONGEST} pixels a side and 1 GB are read"))
             }

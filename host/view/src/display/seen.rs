@@ -5,8 +5,8 @@
 //! Cost: one product for each pair of pieces; one pair a cell in line, at most about sixteen otherwise.
 
 use press::preview::Radiance;
-use press::sheet::DOTS_PER_MM;
 use rayon::prelude::*;
+use sheet::DOTS_PER_MM;
 
 use super::grid::MARGIN;
 use super::{Frame, Grid};

@@ -3,8 +3,8 @@
 use appearance::brdf::{Space, Table, reflectances};
 use appearance::materials::Materials;
 use inks::{Library, Stack};
-use press::sheet::DOTS_PER_MM;
 use proptest::prelude::*;
+use sheet::DOTS_PER_MM;
 
 use super::solve::within;
 use super::*;
@@ -87,7 +87,7 @@ fn in_line_a_mixture_of_stacks_is_shown_as_the_closed_form_says() {
         (0..space.columns()).map(column).collect()
     };
     let image = Rows(3, 2, space.clone(), mixtures.iter().map(mixed).collect());
-    let frame = Frame::of(&grid, &image, &library).unwrap();
+    let frame = Frame::for_image(&grid, &image, &library).unwrap();
     assert!(frame.distance.unwrap().0 < 1e-4, "{:?}", frame.distance);
     let weights = seen(&grid, &frame, &Placed::default(), &HEAD_ON);
     assert!((grid.brightness() - 0.25 * 0.3 * 0.3).abs() < 1e-12);
@@ -336,7 +336,7 @@ fn what_cannot_be_shown_is_said() {
     }
     let grid = Grid::new(screen(), stacks(&two), (3, 3), &library, ROOM).unwrap();
     let image = Rows(2, 2, Space::half_angle(8), vec![vec![0.1; 24]]);
-    assert!(Frame::of(&grid, &image, &library).unwrap_err().to_string().contains("2 x 2"));
+    assert!(Frame::for_image(&grid, &image, &library).unwrap_err().to_string().contains("2 x 2"));
 }
 
 /// A black image opens nothing, and one brighter than everything opens all.

@@ -19,7 +19,7 @@ fn setup() -> Vec<Command<'static>> {
         SelectRgl,
         Resolution(super::Resolution::Dpi600),
         Media(super::super::command::Media::Plain),
-        Paper(PaperCode::of(crate::paper::Paper::A4)),
+        Paper(PaperCode::from_paper(crate::paper::Paper::A4)),
         Length(6372),
         Width(4800),
         CurlCorrection(true),

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::settings::{SETTINGS, Settings};
+use super::settings::{FolderSettings, SETTINGS};
 use crate::document::error::{DocumentError, list};
 use crate::document::names::{self, Role};
 use crate::document::source::Source;
@@ -20,7 +20,7 @@ pub(super) struct Files {
 impl Files {
     pub(super) fn find(
         folder: &Path,
-        settings: &Settings,
+        settings: &FolderSettings,
         source: &mut Source<'_>,
     ) -> Result<Files, DocumentError> {
         let io = |source| DocumentError::Io { path: folder.to_path_buf(), attempt: "list", source };

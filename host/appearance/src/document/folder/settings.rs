@@ -25,7 +25,7 @@ pub enum Workflow {
 /// The contents of `material.toml`. Every key is optional; unknown keys are errors.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Settings {
+pub struct FolderSettings {
     /// The name of the document.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
@@ -91,14 +91,14 @@ impl MapNames {
 }
 
 /// Reads `material.toml` if the folder has one.
-pub(super) fn read(folder: &Path, source: &mut Source<'_>) -> Result<Settings, DocumentError> {
+pub(super) fn read(folder: &Path, source: &mut Source<'_>) -> Result<FolderSettings, DocumentError> {
     let path = folder.join(SETTINGS);
     if !path.is_file() {
-        return Ok(Settings::default());
+        return Ok(FolderSettings::default());
     }
     let text = source.read_text(&path)?;
     let wrong = |problem: String| DocumentError::Settings { path: path.clone(), problem };
-    let settings: Settings = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+    let settings: FolderSettings = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
     if let Some(size) = settings.size_mm {
         check_size_mm(size).map_err(wrong)?;
     }

@@ -24,7 +24,7 @@ pub(super) struct Placement {
 }
 
 impl Placement {
-    fn of(info: &json::texture::Info) -> Placement {
+    fn from_texture(info: &json::texture::Info) -> Placement {
         let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
         Placement {
             offset: transform.map_or([0.0; 2], |t| t.offset.0),
@@ -61,7 +61,7 @@ impl<'a> Loader<'a, '_> {
 
     /// The image of a map that must align with the others.
     pub(super) fn load(&mut self, info: &json::texture::Info, field: &str) -> Result<Loaded, DocumentError> {
-        let placement = Placement::of(info);
+        let placement = Placement::from_texture(info);
         match self.placement {
             None => {
                 if !placement.is_plain() {

@@ -110,7 +110,7 @@ fn slopes_are_the_gradient_of_the_squared_distance() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(60))]
+    #![proptest_config(testing::cases(60))]
 
     #[test]
     fn mixtures_of_the_stacks_are_recovered(

@@ -172,7 +172,7 @@ fn problem() -> impl Strategy<Value = (Vec<Vec<f64>>, Vec<f64>)> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(300))]
+    #![proptest_config(testing::cases(300))]
 
     #[test]
     fn solutions_are_feasible_and_certified((rows, t) in problem()) {

@@ -1,0 +1,247 @@
+//! Art as read: layers of ink, and colours, at 600 dpi.
+//!
+//! Method: a layer starts as coverage, one byte a pixel, whatever its file was. Coverage is resampled to the dots. Layers
+//! to be halftoned keep it, but what is flat in them has the edges of flat art; all others become one bit a dot at half coverage.
+//! Cost: 1 ns a dot for each layer. Limits: soft edges become hard, and a note says how many pixels they had.
+
+use protocol::ink::{Ink, Kind};
+use rayon::prelude::*;
+
+use super::colour::Colour;
+use super::coverage::{Coverage, Scan};
+use super::flat::Flat;
+use super::options::Options;
+use super::{bitplane, names, resample};
+use sheet::Plane;
+
+/// Least coverage of a dot that is ink.
+const THRESHOLD: u8 = 128;
+/// Coverage up to this is plainly paper; coverage from 255 minus this on is plainly ink.
+const PLAIN: u8 = 8;
+
+/// What a layer prints.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// Ink or no ink at each dot.
+    Solid(Plane),
+    /// Coverage from 0 to 255, one byte a dot.
+    Tone(Vec<u8>),
+}
+
+/// One layer of art.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layer {
+    /// Its ink.
+    pub ink: Ink,
+    /// Its source: the name of a file, a channel or a layer.
+    pub name: String,
+    /// Its place from the paper up, if its name begins with a number.
+    pub place: Option<u32>,
+    /// What it prints.
+    pub shape: Shape,
+}
+
+impl Layer {
+    /// Whether it prints nothing.
+    pub(super) fn is_blank(&self) -> bool {
+        match &self.shape {
+            Shape::Solid(plane) => plane.dots() == 0,
+            Shape::Tone(tones) => tones.iter().all(|&tone| tone == 0),
+        }
+    }
+}
+
+/// Art at 600 dpi, or at 1200 x 600.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Artwork {
+    /// Name of the art.
+    pub name: String,
+    /// Dots across.
+    pub width: usize,
+    /// Dots across in 1/600 inch, 1 or 2.
+    pub across: usize,
+    /// Rows.
+    pub length: usize,
+    /// The layers in the order in which they were given.
+    pub layers: Vec<Layer>,
+    /// Colours for the process inks: those of a plain picture, without its reserved colours.
+    pub colour: Option<Colour>,
+    /// Dots on which something is drawn: neither pure white nor transparent, or ink of a layer.
+    pub drawn: Plane,
+    /// Dots that are not transparent, if the art has transparency.
+    pub opaque: Option<Plane>,
+    /// What the reader had to assume, in sentences.
+    pub notes: Vec<String>,
+}
+
+impl Artwork {
+    /// Art of `width` x `length` dots on which nothing is drawn.
+    pub(super) fn blank(name: &str, (width, length): (usize, usize)) -> Artwork {
+        Artwork {
+            name: name.into(),
+            width,
+            across: 1,
+            length,
+            layers: Vec::new(),
+            colour: None,
+            drawn: bitplane::blank(width, length),
+            opaque: None,
+            notes: Vec::new(),
+        }
+    }
+
+    /// Adds a layer. `plate` marks the coverage as that of a printing plate, which keeps its tones, and adds nothing if it is
+    /// blank.
+    pub(super) fn add(
+        &mut self,
+        scan: Scan,
+        name: &str,
+        named: names::Named,
+        plate: bool,
+        options: &Options,
+    ) {
+        if plate && scan.coverage.iter().all(|&c| c == 0) {
+            return;
+        }
+        let (layer, mut notes) = layer(scan, name, named, plate, (self.width, self.length), options);
+        match &layer.shape {
+            Shape::Solid(plane) => bitplane::add(&mut self.drawn, plane),
+            Shape::Tone(tones) => {
+                bitplane::add(&mut self.drawn, &bitplane::from_bytes(self.width, tones, |c| c > PLAIN))
+            }
+        }
+        self.layers.push(layer);
+        self.notes.append(&mut notes);
+    }
+}
+
+/// A layer from its coverage, and notes on it.
+fn layer(
+    scan: Scan,
+    name: &str,
+    named: names::Named,
+    plate: bool,
+    (width, length): (usize, usize),
+    options: &Options,
+) -> (Layer, Vec<String>) {
+    let mut notes = Vec::new();
+    match scan.by {
+        Coverage::Dark => {}
+        Coverage::Opaque => notes.push(format!("{name}: ink prints where the picture is not transparent")),
+        Coverage::DarkAndOpaque => notes.push(format!(
+            "{name}: several colours on a transparent background; ink prints where they are dark, and the light parts are \
+             left out"
+        )),
+        Coverage::Drawn => notes.push(format!("{name}: drawn in several colours; all of it is ink")),
+        Coverage::NotWhite => {
+            notes.push(format!("{name}: drawn in one colour and white; the colour is ink, white is not"))
+        }
+    }
+    let toned = plate
+        && match named.ink.kind() {
+            Kind::Process => has_tones(&scan.coverage),
+            // A solid ink with tones in its edges would be ragged.
+            _ => has_areas_of_tone(&scan.coverage, scan.width as usize),
+        };
+    if toned {
+        notes.push(format!("{name}: the plate has tones, so it is halftoned"));
+    }
+    let tones = toned || options.tones.contains(named.ink);
+    if !tones && (width, length) != (scan.width as usize, scan.height as usize) {
+        notes.push(resample::note(name, scan.size_at(options.dpi), (width, length), options));
+    }
+    if !tones && let Some(note) = soft_edges(name, &scan.coverage, scan.width as usize) {
+        notes.push(note);
+    }
+    let size = (scan.width, scan.height);
+    let coverage = match tones {
+        true => {
+            let flat = flat(&scan.coverage, size).at_dots(size, (width, length));
+            let mut coverage = resample::tones(scan.coverage, size, (width, length));
+            exact(&mut coverage, &flat);
+            coverage
+        }
+        false => resample::solid(scan.coverage, size, (width, length)),
+    };
+    let layer =
+        Layer { ink: named.ink, name: name.into(), place: named.place, shape: shape(width, coverage, tones) };
+    if let Shape::Solid(plane) = &layer.shape
+        && plane.dots() == 0
+    {
+        notes.push(format!("{}: no pixel is dark enough to be ink; draw layers in black", layer.name));
+    }
+    (layer, notes)
+}
+
+/// What is flat in a plate, as in a grey picture: beside tones the softened edges of letters are still edges.
+fn flat(coverage: &[u8], (width, _): (u32, u32)) -> Flat {
+    let grey: Vec<[u8; 3]> = coverage.par_iter().map(|&c| [255 - c; 3]).collect();
+    Flat::of(&grey, width as usize)
+}
+
+/// Gives the dots of flat areas and letters their own coverage, without what lies beside them.
+fn exact(coverage: &mut [u8], flat: &Flat) {
+    coverage.par_iter_mut().zip(&flat.index).for_each(|(coverage, &dot)| {
+        if let Some((_, [grey, ..])) = flat.colours.get(usize::from(dot)) {
+            *coverage = 255 - grey;
+        }
+    });
+}
+
+/// Coverage as a layer's shape.
+fn shape(width: usize, coverage: Vec<u8>, tones: bool) -> Shape {
+    if tones {
+        Shape::Tone(coverage)
+    } else {
+        Shape::Solid(bitplane::from_bytes(width, &coverage, |c| c >= THRESHOLD))
+    }
+}
+
+/// A note on pixels that are neither plainly ink nor plainly paper, if there are any.
+fn soft_edges(name: &str, coverage: &[u8], width: usize) -> Option<String> {
+    let between = coverage.par_iter().filter(|&&c| is_between(c)).count();
+    let inked = coverage.par_iter().filter(|c| (THRESHOLD..255 - PLAIN).contains(c)).count();
+    let share = 100.0 * between as f64 / coverage.len().max(1) as f64;
+    let advice = if has_areas_of_tone(coverage, width) {
+        "; if they are tones rather than edges, have this layer keep its tones"
+    } else {
+        ""
+    };
+    (between > 0).then(|| {
+        format!(
+            "{name}: {between} pixels ({share:.2} %) are neither ink nor paper, such as anti-aliased edges; {inked} of \
+             them are dark enough to be ink, and the others are left out{advice}"
+        )
+    })
+}
+
+/// Whether a pixel is neither plainly ink nor plainly paper.
+fn is_between(coverage: u8) -> bool {
+    coverage > PLAIN && coverage < 255 - PLAIN
+}
+
+/// Whether coverage has tones rather than soft edges: more than a twentieth of all pixels with ink are partly covered.
+fn has_tones(coverage: &[u8]) -> bool {
+    let inked = coverage.par_iter().filter(|&&c| c > PLAIN).count();
+    let between = coverage.par_iter().filter(|&&c| is_between(c)).count();
+    20 * between > inked
+}
+
+/// Whether coverage has areas of tone: a quarter of the partly covered pixels have only such pixels beside them. Softened edges
+/// are too narrow for that.
+fn has_areas_of_tone(coverage: &[u8], width: usize) -> bool {
+    let beside = |at: Option<usize>| at.and_then(|at| coverage.get(at)).is_none_or(|&c| is_between(c));
+    let count = |(y, row): (usize, &[u8])| {
+        let between = || (0..row.len()).filter(|&x| is_between(row[x]));
+        let inside = between().filter(|&x| {
+            let at = y * width + x;
+            let left = x.checked_sub(1).map(|_| at - 1);
+            let right = (x + 1 < width).then_some(at + 1);
+            [left, right, at.checked_sub(width), Some(at + width)].into_iter().all(beside)
+        });
+        (between().count(), inside.count())
+    };
+    let rows = coverage.par_chunks(width.max(1)).enumerate();
+    let (between, inside) = rows.map(count).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    between > 0 && 4 * inside >= between
+}

@@ -1,0 +1,288 @@
+//! Layers to stacks: white, finish, order, passes, knockout, undercoats.
+//!
+//! Problem: layers tell where each ink is, while a sheet tells which inks lie on each dot, bottom to top. Some inks also need
+//! others beneath them that nobody drew.
+//! Method: every layer is a plane; tones and colours are halftoned to planes. All planes are read eight dots at a time, the
+//! combinations that occur are counted, and each becomes a stack: the inks in their [`Order`], with
+//! [`Settings::passes`] of each, without knocked-out inks, with accepted undercoats. If the art lacks something, the result
+//! has a [`Suggestion`]; nothing is added silently.
+//! Cost: about 2 ns a dot, and the halftones. Limits: [`MOST_PASSES`] planes, 256 stacks.
+
+mod arrange;
+mod beds;
+mod settings;
+mod slot;
+mod suggest;
+
+use inks::{InkSet, Library, Stack};
+use protocol::ink::{Ink, Kind};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::artwork::{Artwork, Shape};
+use super::bitplane;
+use super::error::{
+    foil, no_sheet, not_halftoned, nothing, only_white, too_many_passes, too_small, unfitted,
+};
+use super::size::MM;
+use super::white::White;
+use appearance::gamut::InkMix;
+use appearance::weights::{ONE, WeightMaps};
+use halftone::halftone;
+use observe::{Diagnosis, Observer};
+use sheet::DotMap;
+use sheet::order::customary;
+use sheet::{MOST_PASSES, Plane, pack};
+
+use slot::{COLOURS, Slot};
+
+pub use arrange::Order;
+pub use beds::MOST_CHOKE_MM;
+pub use settings::{Finish, GAMMAS, Settings};
+pub use slot::Laid;
+pub use suggest::{Accept, Remedy, Suggestion};
+
+/// A report on composed art.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// Width and height in millimetres.
+    pub size_mm: (f64, f64),
+    /// The inks from the paper up.
+    pub laid: Vec<Laid>,
+    /// Dots without any ink.
+    pub bare: u64,
+    /// What had to be assumed, including the notes of the art.
+    pub notes: Vec<String>,
+}
+
+/// Art as stacks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Composed {
+    /// The dots.
+    pub dots: DotMap,
+    /// A report on them.
+    pub report: Report,
+    /// What the art lacks.
+    pub suggestions: Vec<Suggestion>,
+}
+
+/// Composes art to one stack for every dot.
+///
+/// # Errors
+/// Settings that do not suit the art, more passes than a sheet can take, art without a dot.
+pub fn compose(
+    art: &Artwork,
+    settings: &Settings,
+    library: &Library,
+    observer: &dyn Observer,
+) -> Result<Composed, Diagnosis> {
+    let mut notes = art.notes.clone();
+    let mut tell = |note: String| {
+        observer.note(&note);
+        notes.push(note);
+    };
+    if art.width as u64 * art.length as u64 == 0 {
+        return Err(too_small(art.width as f64 * MM, art.length as f64 * MM));
+    }
+    let mut slots = drawn_slots(art, settings, library, observer, &mut tell)?;
+    beds::lay_white(&mut slots, art, settings, &mut tell)?;
+    beds::lay_finish(&mut slots, art, settings)?;
+    slots.retain(|slot| slot.plane.dots() > 0);
+    if slots.is_empty() {
+        let is_drawn = art.opaque.as_ref().is_some_and(|opaque| opaque.dots() > 0);
+        let reason = match &art.layers[..] {
+            [] if is_drawn => return Err(only_white(&art.name)),
+            [] => format!("{} is white or transparent everywhere", art.name),
+            _ => format!("no layer of {} has a dot", art.name),
+        };
+        return Err(nothing(reason));
+    }
+    let mut inks: Vec<Ink> = slots.iter().map(|slot| slot.ink).collect();
+    inks.sort_unstable();
+    inks.dedup();
+    let mut slots = arrange::arranged(slots, &settings.order, library)?;
+    for slot in &mut slots {
+        slot.passes =
+            usize::from(settings.passes.iter().find(|(ink, _)| *ink == slot.ink).map_or(1, |p| p.1));
+    }
+    if let Some((ink, _)) = settings.passes.iter().find(|(ink, _)| !inks.contains(ink)) {
+        tell(format!("the art has no {}, so its number of passes has no effect", ink.name()));
+    }
+    let passes: usize = slots.iter().map(|slot| slot.passes).sum();
+    if passes > MOST_PASSES {
+        let inks =
+            slots.iter().flat_map(|slot| vec![slot.ink.name(); slot.passes]).collect::<Vec<_>>().join(", ");
+        return Err(too_many_passes(passes, &inks));
+    }
+    stack_up(art, &slots, settings, notes)
+}
+
+/// The layers of the art itself, with tones and colours halftoned.
+fn drawn_slots(
+    art: &Artwork,
+    settings: &Settings,
+    library: &Library,
+    observer: &dyn Observer,
+    tell: &mut dyn FnMut(String),
+) -> Result<Vec<Slot>, Diagnosis> {
+    let mut slots: Vec<Slot> = Vec::new();
+    for layer in &art.layers {
+        let name = layer.ink.name();
+        let unwanted = match layer.ink {
+            Ink::White => settings.white == Some(White::None),
+            Ink::Finish => settings.finish == Some(Finish::None),
+            _ => false,
+        };
+        if unwanted {
+            tell(format!("{}: left out, because the settings ask for no {name}", layer.name));
+            continue;
+        }
+        if !settings.inks.contains(layer.ink) {
+            if layer.ink.kind() == Kind::Foil {
+                return Err(foil(&layer.name, layer.ink));
+            }
+            tell(format!("{}: left out, because {name} is not among the allowed inks", layer.name));
+            continue;
+        }
+        let plane = match &layer.shape {
+            Shape::Solid(plane) => plane.clone(),
+            Shape::Tone(coverage) => tone(coverage, art, layer.ink, settings, library, observer)?,
+        };
+        let (ink, from, place) = (layer.ink, layer.name.clone(), layer.place);
+        slots.push(Slot { ink, from, place, plane, passes: 1 });
+    }
+    if let Some(colour) = &art.colour {
+        let process = InkSet::of(settings.inks.iter().filter(|ink| ink.kind() == Kind::Process));
+        if process.is_empty() {
+            tell("the picture's colours are left out, because no process ink is allowed".into());
+            return Ok(slots);
+        }
+        let planes = colour.planes((art.width, art.length), &process, settings, library, observer)?;
+        let mut spot = bitplane::blank(art.width, art.length);
+        slots.iter().for_each(|slot| bitplane::add(&mut spot, &slot.plane));
+        for (ink, mut plane) in planes {
+            if !colour.overprints {
+                // Dots of a layer, such as a reserved colour, keep that ink alone.
+                bitplane::merge(&mut plane, &spot, |dots, spot| dots & !spot);
+            }
+            match slots.iter_mut().find(|slot| slot.ink == ink) {
+                Some(slot) => bitplane::add(&mut slot.plane, &plane),
+                None => slots.push(Slot { ink, from: COLOURS.into(), place: None, plane, passes: 1 }),
+            }
+        }
+    }
+    Ok(slots)
+}
+
+/// Halftones a layer with tones, in clusters large enough for its ink.
+fn tone(
+    coverage: &[u8],
+    art: &Artwork,
+    ink: Ink,
+    settings: &Settings,
+    library: &Library,
+    observer: &dyn Observer,
+) -> Result<Plane, Diagnosis> {
+    let weights = coverage.iter().flat_map(|&c| {
+        let ink = ((u32::from(c) * u32::from(ONE) + 127) / 255) as u16;
+        [ONE - ink, ink]
+    });
+    let maps = WeightMaps::new(art.width, art.length, 2, weights.collect()).map_err(unfitted)?;
+    let stacks = vec![Stack::SUBSTRATE, Stack::new([ink])];
+    let mix = InkMix { stacks, maps, matrix: vec![vec![ONE, 0], vec![0, ONE]] };
+    let (width, height) = (art.width as u16, art.length as u16);
+    let toning = halftone::Settings {
+        method: settings.halftone,
+        ..halftone::Settings::from_library(&mix.stacks, library)
+    };
+    // What the plate has wholly or not at all is no tone.
+    let fixed = coverage.par_iter().map(|&c| match c {
+        0 => 0,
+        255 => 1,
+        _ => halftone::TONE,
+    });
+    let fixed: Vec<u8> = fixed.collect();
+    let dots = halftone(&mix, (width, height), Some(&fixed), &toning, observer).map_err(not_halftoned)?;
+    Ok(bitplane::from_bytes(art.width, dots.index(), |stack| stack == 1))
+}
+
+/// The inks on a dot with the slots of `mask`, from the paper up.
+fn layers(slots: &[Slot], mask: usize, settings: &Settings) -> Vec<Ink> {
+    let mut layers: Vec<Ink> = Vec::new();
+    for (_, slot) in slots.iter().enumerate().filter(|(at, _)| mask & 1 << at != 0) {
+        if settings.knockout.contains(slot.ink) {
+            layers.retain(|ink| ink.kind() != Kind::Process);
+        }
+        let three_times =
+            slot.ink == Ink::White && slot.passes == 1 && settings.accept.contains(&Accept::WhiteThrice);
+        let passes = if three_times { 3 } else { slot.passes };
+        layers.extend(std::iter::repeat_n(slot.ink, passes));
+    }
+    if settings.accept.contains(&Accept::FoilUndercoat)
+        && let Some(foil) = layers.iter().position(|ink| ink.kind() == Kind::Foil)
+    {
+        // All process inks in their customary order replace those directly beneath the foil.
+        let from = layers[..foil].iter().rposition(|ink| ink.kind() != Kind::Process).map_or(0, |at| at + 1);
+        let mut coat: Vec<Ink> = Ink::ALL.into_iter().filter(|ink| ink.kind() == Kind::Process).collect();
+        coat.sort_by_key(|&ink| customary(ink));
+        layers.splice(from..foil, coat);
+    }
+    if settings.accept.contains(&Accept::EvenWhite)
+        && let Some(at) = layers.windows(2).position(|pair| pair == [Ink::Black, Ink::White])
+    {
+        layers.splice(at + 1..at + 1, [Ink::Primer, Ink::Finish, Ink::Primer]);
+    }
+    layers
+}
+
+/// Makes a stack of every combination of slots that occurs.
+fn stack_up(
+    art: &Artwork,
+    slots: &[Slot],
+    settings: &Settings,
+    notes: Vec<String>,
+) -> Result<Composed, Diagnosis> {
+    let (width, length) = (art.width, art.length);
+    let planes: Vec<&Plane> = slots.iter().map(|slot| &slot.plane).collect();
+    let census = pack::census(&planes, width, length);
+    let mut stacks = vec![Stack::SUBSTRATE];
+    let mut counts = vec![0u64];
+    let mut stack_of = vec![0u16; census.len()];
+    for (mask, &count) in census.iter().enumerate().filter(|(_, count)| **count > 0) {
+        let stack = Stack::new(layers(slots, mask, settings));
+        let number = stacks.iter().position(|known| *known == stack).unwrap_or_else(|| {
+            stacks.push(stack);
+            counts.push(0);
+            stacks.len() - 1
+        });
+        counts[number] += count;
+        // More than 256 stacks are refused below.
+        stack_of[mask] = number.min(256) as u16;
+    }
+    // Every combination that occurs has an entry in the table, so unpacking always succeeds.
+    let index = pack::unpack(&planes, width, length, &stack_of).unwrap_or_default();
+    let dots = DotMap::new(width, length, stacks, index).map_err(no_sheet)?;
+    let laid: Vec<Laid> = slots
+        .iter()
+        .enumerate()
+        .map(|(at, slot)| Laid {
+            ink: slot.ink.name(),
+            dots: census
+                .iter()
+                .enumerate()
+                .filter(|(mask, _)| mask & 1 << at != 0)
+                .map(|(_, count)| count)
+                .sum(),
+            from: slot.from.clone(),
+            passes: slot.passes,
+        })
+        .collect();
+    let order: Vec<Ink> = slots.iter().map(|slot| slot.ink).collect();
+    let mut suggestions = suggest::suggest(dots.stacks(), &counts, &order);
+    suggestions.extend(suggest::rare(&laid));
+    let size_mm = ((width / art.across) as f64 * MM, length as f64 * MM);
+    Ok(Composed { report: Report { size_mm, laid, bare: counts[0], notes }, dots, suggestions })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,149 @@
+//! Decodes pictures of any format within limits.
+//!
+//! Method: the `image` crate decodes PNG, JPEG, TIFF, PNM, BMP, GIF and WebP, chosen by what the file holds; of an animation the
+//! first picture. Limits: a gigabyte of file, [`MOST_PIXELS`] pixels. A damaged colour profile is no reason to refuse a picture. The decoder of JPEG makes up what a file
+//! that was cut short lacks, so the end of the picture is looked for first.
+
+use std::fmt::Display;
+use std::io::{ErrorKind, Read};
+use std::path::Path;
+
+use image::{DynamicImage, ImageError, ImageFormat};
+use observe::Diagnosis;
+use pictures::Bounds;
+use pictures::resolution::{self, Dpi};
+
+use super::error::{io, wrong};
+use super::orientation::Turn;
+use super::size::{MOST_BYTES, MOST_PIXELS, check_pixels};
+use super::tiff_pages;
+
+/// A decoded picture, the right way up.
+pub(super) struct Decoded {
+    pub image: DynamicImage,
+    pub dpi: Option<Dpi>,
+    pub profile: Option<Vec<u8>>,
+}
+
+/// Decodes a whole picture; of a TIFF with several pages the one of this number.
+pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Result<Decoded, Diagnosis> {
+    let mut bytes = Vec::new();
+    file.by_ref().take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(io(path, "read it"))?;
+    let guessed = image::guess_format(&bytes).ok();
+    let format = guessed.filter(|format| {
+        use ImageFormat::{Bmp, Gif, Jpeg, Png, Pnm, Tiff, WebP};
+        matches!(format, Png | Jpeg | Tiff | Pnm | Bmp | Gif | WebP)
+    });
+    let Some(format) = format else {
+        let found = match guessed {
+            Some(format) => format!("{format:?}").to_uppercase() + ", which is not read",
+            None if bytes.is_empty() => "an empty file".into(),
+            // As drawings in `.svgz` are.
+            None if bytes.starts_with(b"\x1f\x8b") => {
+                "a compressed one; unpack it, such as with gunzip".into()
+            }
+            None => "an unknown format".into(),
+        };
+        return Err(wrong(
+            path,
+            format!(
+                "expected a PNG, TIFF, JPEG, PNM, BMP, GIF, WebP, SVG, PDF or PostScript file, found {found}"
+            ),
+        ));
+    };
+    if format == ImageFormat::Jpeg && jpeg_frame(&bytes).is_some_and(|(channels, ..)| channels == 4) {
+        return Err(wrong(path, "the picture is CMYK, which is four layers instead of one")
+            .hint("convert it to greyscale"));
+    }
+    match format {
+        ImageFormat::Jpeg => whole_jpeg(path, &bytes)?,
+        ImageFormat::Tiff => tiff_pages::choose(path, &mut bytes, page)?,
+        _ => {}
+    }
+    let bad = |error: ImageError| {
+        if let ImageError::Unsupported(found) = &error {
+            return wrong(path, found.to_string())
+                .hint("save the picture in RGB or grey, with 8 or 16 bits a channel");
+        }
+        let cause = if let ImageError::IoError(cause) = &error { Some(cause) } else { None };
+        undecodable(path, &error, cause)
+    };
+    let bounds = Bounds { side: None, bytes: 8 * MOST_PIXELS };
+    let mut opened = pictures::open(&bytes, format, bounds).map_err(bad)?;
+    let (width, height) = opened.size();
+    check_pixels(path, width, height)?;
+    let profile = opened.profile();
+    let turn = Turn(opened.orientation());
+    let dpi = turn.dpi(resolution::of_file(&bytes, format));
+    let mut image = opened.decode().map_err(bad)?;
+    image.apply_orientation(turn.0);
+    Ok(Decoded { image, dpi, profile })
+}
+
+/// A picture that ends before its end.
+const CUT_SHORT: &str = "the picture ends before its last row: the file was cut short; copy or save it again";
+
+/// Why a picture cannot be decoded; `cause` is what reading its bytes ended with, if that is the reason.
+pub(super) fn undecodable(path: &Path, error: &impl Display, cause: Option<&std::io::Error>) -> Diagnosis {
+    match cause {
+        Some(cause) if cause.kind() == ErrorKind::UnexpectedEof => wrong(path, CUT_SHORT),
+        _ => wrong(path, format!("cannot decode the picture: {error}")),
+    }
+}
+
+/// Refuses a JPEG that was cut short: one without the marker of its end.
+pub(super) fn whole_jpeg(path: &Path, bytes: &[u8]) -> Result<(), Diagnosis> {
+    if jpeg_has_end(bytes) { Ok(()) } else { Err(wrong(path, CUT_SHORT)) }
+}
+
+/// Whether a JPEG has the marker of its end, outside of the segments with data of their own, such as a small copy in EXIF.
+fn jpeg_has_end(bytes: &[u8]) -> bool {
+    let mut rest = bytes;
+    while let Some(at) = rest.iter().position(|&byte| byte == 0xff) {
+        rest = &rest[at + 1..];
+        match rest.first() {
+            Some(0xd9) => return true,
+            // An FF among the data of a scan, a restart, a start, or one more FF.
+            Some(0 | 1 | 0xd0..=0xd8 | 0xff) => {}
+            _ => {
+                let Some(&[_, high, low]) = rest.first_chunk() else { return false };
+                rest = rest.get(1 + usize::from(u16::from_be_bytes([high, low]))..).unwrap_or_default();
+            }
+        }
+    }
+    false
+}
+
+/// Channels, height and width of a JPEG, from the first of its frame headers.
+pub(super) fn jpeg_frame(bytes: &[u8]) -> Option<(u8, u16, u16)> {
+    let mut rest = bytes.strip_prefix(b"\xff\xd8")?;
+    loop {
+        let (&[0xff, marker, high, low], body) = rest.split_first_chunk::<4>()? else { return None };
+        // C4, C8 and CC are tables, all others of this row are frames.
+        if (0xc0..=0xcf).contains(&marker) && ![0xc4, 0xc8, 0xcc].contains(&marker) {
+            let &[_, h, e, w, i, channels] = body.first_chunk()?;
+            return Some((channels, u16::from_be_bytes([h, e]), u16::from_be_bytes([w, i])));
+        }
+        rest = body.get(usize::from(u16::from_be_bytes([high, low])).checked_sub(2)?..)?;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_end_of_a_jpeg_is_found_behind_its_scans_and_not_in_its_segments() {
+        let whole = [
+            &b"\xff\xd8\xff\xe1\0\x06\xff\xd9xx"[..],
+            b"\xff\xda\0\x04ab scan \xff\0\xff\xd0 scan",
+            b"\xff\xff\xc4\0\x03a\xff\xda\0\x02more\xff\xd9rest",
+        ];
+        let bytes = whole.concat();
+        assert!(jpeg_has_end(&bytes));
+        let end = bytes.windows(6).position(|six| six == b"more\xff\xd9").unwrap() + 6;
+        for cut in 0..bytes.len() {
+            assert_eq!(jpeg_has_end(&bytes[..cut]), cut >= end, "{cut}");
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! Options of the readers of art.
+
+use inks::InkSet;
+use protocol::ink::Ink;
+
+use sheet::Size;
+
+/// How to read art.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Size on paper; overrides the size in the file.
+    pub size: Option<Size>,
+    /// Resolution in pixels per inch; overrides the resolution in the file.
+    pub dpi: Option<f64>,
+    /// Whether the vendor's reserved colours stand for their inks.
+    pub reserved: bool,
+    /// Largest difference of red, green and blue from a reserved colour; `None` for each ink's own tolerance.
+    pub tolerance: Option<u8>,
+    /// Pages of a PDF, PostScript or TIFF file.
+    pub pages: Pages,
+    /// Layers that keep their tones, and are halftoned; all others are ink or paper.
+    pub tones: InkSet,
+    /// Dots across in 1/600 inch: 1, or 2 for a print at 1200 x 600 dpi.
+    pub across: usize,
+    /// The inks that reserved colours may stand for.
+    pub inks: InkSet,
+    /// Room on the page: art without a size of its own is fitted to it.
+    pub room: Room,
+}
+
+impl Options {
+    /// The page that was chosen by its number.
+    pub(super) fn page(&self) -> Option<u32> {
+        if let Pages::Number(number) = self.pages { Some(number) } else { None }
+    }
+}
+
+/// Which pages of a document to read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Pages {
+    /// The only one that holds art.
+    Only,
+    /// The one of this number, from 1.
+    Number(u32),
+    /// One for each ink, from the first page on.
+    Inks(Vec<Ink>),
+}
+
+/// Room for art on a page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Room {
+    /// Dots across.
+    pub width: usize,
+    /// Dots down.
+    pub length: usize,
+    /// Whether art may be larger because the page crops it.
+    pub cut: bool,
+}
+
+impl Default for Room {
+    /// The largest page, without cropping.
+    fn default() -> Room {
+        let (width, length) = protocol::paper::LARGEST;
+        Room { width: width.into(), length: length.into(), cut: false }
+    }
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options {
+            size: None,
+            dpi: None,
+            reserved: false,
+            tolerance: None,
+            pages: Pages::Only,
+            tones: InkSet::EMPTY,
+            across: 1,
+            inks: InkSet::default().with(Ink::White),
+            room: Room::default(),
+        }
+    }
+}

@@ -1,0 +1,304 @@
+//! The plates of a page: spot colours that name inks, and the process plates.
+//!
+//! Problem: a spot colour may name an ink, or none; and one colour may be made of several spots (DeviceN), of which some
+//! name inks.
+//! Method: Ghostscript makes a plate of every spot. A spot that names a special ink is a layer of it. Every other spot is
+//! printed by its process colours: its plate is added to the process plates, in the shares that Ghostscript gives for its
+//! full tint. So a colour of several spots keeps each part. A name that resembles that of an ink is an error, because a
+//! slip would cost ribbon. The layers of art and the print queues use the same two functions, [`survey`] and [`separated`].
+//! If a process plate has tones, the page is drawn once more with the kind of each pixel, and what lies beside the layers is
+//! treated like any page: letters keep their outline. On dots of layers the process plates say what overprints.
+//! Cost: seconds a page, twice if it has tones. Limits: where a spot overprints, tints between none and full are taken as
+//! proportional.
+
+use std::fmt::Display;
+use std::path::Path;
+
+use protocol::ink::Kind;
+use rayon::prelude::*;
+
+use super::super::artwork::Artwork;
+use super::super::coverage::{self, Coverage, Scan};
+use super::super::error::{NamedPart, io, unknown_ink, wrong};
+use super::super::names::{self, Named};
+use super::super::options::Options;
+use super::super::size;
+use super::super::window::Window;
+use super::super::{kinds, picture};
+use super::draw::{PROCESS, Part, Tagged, drafts, plates_beside, separate, tagged};
+use super::ghostscript::Interpreter;
+use files::scratch::Scratch;
+use observe::{Diagnosis, Observer};
+
+/// Full ink in what Ghostscript says of a spot.
+const FULL: f64 = 32760.0;
+
+/// Whether a spot is a layer, and of which ink. One that names a process ink is printed by its process colours, like one
+/// that names no ink; of the latter there is a note, which begins with `place`.
+///
+/// # Errors
+/// A name that resembles that of an ink.
+fn layer(
+    path: &Path,
+    place: &dyn Display,
+    spot: &str,
+    notes: &mut Vec<String>,
+) -> Result<Option<Named>, Diagnosis> {
+    match names::ink(spot) {
+        Some(named) => Ok(Some(named).filter(|named| named.ink.kind() != Kind::Process)),
+        None => match names::closest(spot) {
+            suggestion @ Some(_) => Err(unknown_ink(path, NamedPart::Spot, spot, suggestion)),
+            None => {
+                notes.push(format!(
+                    "{place}: spot colour `{spot}` names no ink: printed by its process colours"
+                ));
+                Ok(None)
+            }
+        },
+    }
+}
+
+/// Of these spots, those that are layers of ink.
+pub(super) fn layers(
+    path: &Path,
+    place: &dyn Display,
+    spots: &[String],
+    notes: &mut Vec<String>,
+) -> Result<Vec<String>, Diagnosis> {
+    let mut found = Vec::new();
+    for spot in spots {
+        if layer(path, place, spot, notes)?.is_some() {
+            found.push(spot.clone());
+        }
+    }
+    Ok(found)
+}
+
+/// What drafts tell of a whole document.
+pub struct Survey {
+    /// For each page the spot colours that are layers of ink and not blank. Empty for a document without pages.
+    pub spots: Vec<Vec<String>>,
+    /// The interpreter that draws most of it.
+    pub interpreter: Interpreter,
+}
+
+/// Looks at all pages of a document. Notes name the page of a spot colour that names no ink.
+///
+/// # Errors
+/// A document that Ghostscript cannot read, no Ghostscript, or a name that resembles that of an ink.
+pub fn survey(path: &Path, observer: &dyn Observer) -> Result<Survey, Diagnosis> {
+    let folder = Scratch::new().map_err(io(path, "make a folder for its plates"))?;
+    let (drafts, interpreter) = drafts(path, None, Part::Sheet, &folder)?;
+    let mut notes = Vec::new();
+    let spots = drafts
+        .leaves
+        .iter()
+        .map(|leaf| layers(path, &format_args!("page {}", leaf.number), &leaf.spots, &mut notes))
+        .collect::<Result<_, _>>()?;
+    notes.iter().for_each(|note| observer.note(note));
+    Ok(Survey { spots, interpreter })
+}
+
+/// A page as plates: one for each spot colour that is a layer of ink, and the process plates for the rest.
+pub struct Separated {
+    /// Pixels across and down.
+    pub size: (usize, usize),
+    dpi: f64,
+    plates: Vec<(String, Named, Vec<u8>)>,
+    /// What is printed beside the plates, with the kind of each pixel.
+    rest: Option<Vec<u8>>,
+    notes: Vec<String>,
+}
+
+/// Separates a page at `dpi` pixels per inch into plates for the spot colours of [`survey`] and the process plates.
+///
+/// # Errors
+/// As [`open`](super::super::open()).
+pub fn separated(
+    path: &Path,
+    interpreter: Interpreter,
+    page: usize,
+    dpi: f64,
+) -> Result<Separated, Diagnosis> {
+    let page = u32::try_from(page).map_err(|_| wrong(path, format!("there is no page {page}")))?;
+    separated_part((path, interpreter), page, Part::Sheet, (dpi, dpi))
+}
+
+pub(super) fn separated_part(
+    (path, interpreter): (&Path, Interpreter),
+    page: u32,
+    part: Part,
+    dpi: (f64, f64),
+) -> Result<Separated, Diagnosis> {
+    let folder = Scratch::new().map_err(io(path, "make a folder for its plates"))?;
+    let full = folder.path().join("page.tif");
+    let said = separate((path, interpreter), page, part, dpi, &full)?;
+    let (width, height) =
+        image::image_dimensions(&full).map_err(|_| wrong(path, format!("there is no page {page}")))?;
+    let (mut plates, mut notes) = (Vec::new(), Vec::new());
+    let (mut process, mut others) = (Vec::new(), Vec::new());
+    for (plate, file) in plates_beside(&full, &folder)? {
+        let scan = coverage::scan(&file, None)?;
+        if (scan.width, scan.height) != (width, height) {
+            return Err(wrong(path, format!("plate {plate} of page {page} differs in size from the page")));
+        }
+        if PROCESS.contains(&plate.as_str()) {
+            process.push((plate, scan.coverage));
+        } else if scan.coverage.iter().any(|&c| c > 0) {
+            match layer(path, &path.display(), &plate, &mut notes)? {
+                Some(named) => plates.push((plate, named, scan.coverage)),
+                None => others.push((plate, scan.coverage)),
+            }
+        }
+    }
+    for (spot, coverage) in others {
+        match full_tint(&said, &spot) {
+            Some(tint) => add(&mut process, &coverage, tint),
+            None => notes.push(format!(
+                "{}: the process colours of spot colour `{spot}` are not known: left out",
+                path.display()
+            )),
+        }
+    }
+    let toned = |coverage: &[u8]| coverage.par_iter().any(|&c| c != 0 && c != 255);
+    let mut rest = None;
+    if process.iter().any(|(_, coverage)| toned(coverage)) {
+        let Tagged { size, mut pixels } = tagged((path, interpreter), page, part, dpi, &folder)?;
+        if size != (width, height) {
+            return Err(wrong(path, format!("page {page} differs in size from its plates")));
+        }
+        overprint(&mut pixels, &plates, &process);
+        rest = Some(pixels);
+    } else {
+        for (plate, coverage) in process {
+            if let Some(named) = names::ink(&plate) {
+                plates.push((plate, named, coverage));
+            }
+        }
+    }
+    Ok(Separated { size: (width as usize, height as usize), dpi: dpi.0, plates, rest, notes })
+}
+
+/// Replaces what was drawn on the dots of layers, where it shows the layer, with what the process plates have there.
+fn overprint(pixels: &mut [u8], layers: &[(String, Named, Vec<u8>)], process: &[(String, Vec<u8>)]) {
+    const ROWS: usize = 1 << 16;
+    let of = |name: &str| process.iter().find(|(plate, _)| plate == name).map(|(_, coverage)| &coverage[..]);
+    let inks = PROCESS.map(of);
+    pixels.par_chunks_mut(kinds::BYTES * ROWS).enumerate().for_each(|(block, pixels)| {
+        for (at, pixel) in (block * ROWS..).zip(pixels.as_chunks_mut::<{ kinds::BYTES }>().0) {
+            if layers.iter().any(|(.., coverage)| coverage[at] > 0) {
+                let [c, m, y, k] = inks.map(|ink| ink.map_or(0, |coverage| coverage[at]));
+                let [_, rgb @ ..] = pixel;
+                // As what is drawn beside the layers is converted ([`conversion`](super::conversion)).
+                *rgb = [c, m, y].map(|ink| 255 - ink.saturating_add(k));
+            }
+        }
+    });
+}
+
+/// The process colours of a spot's full tint, as shares from 0 to 1 in the order of [`PROCESS`], from what Ghostscript says:
+/// `%%SeparationColor: "NAME" 100% ink = C M Y K CMYK`.
+fn full_tint(said: &str, spot: &str) -> Option<[f64; 4]> {
+    said.lines().find_map(|line| {
+        let (name, rest) = line.strip_prefix("%%SeparationColor: \"")?.split_once("\" 100% ink = ")?;
+        if name != spot {
+            return None;
+        }
+        let shares: Vec<f64> = rest.split_whitespace().map_while(|word| word.parse().ok()).collect();
+        let shares: [f64; 4] = shares.try_into().ok()?;
+        Some(shares.map(|share| (share / FULL).clamp(0.0, 1.0)))
+    })
+}
+
+/// Adds a spot's plate to the process plates.
+fn add(process: &mut [(String, Vec<u8>)], coverage: &[u8], tint: [f64; 4]) {
+    for (plate, dots) in process {
+        let Some(at) = PROCESS.iter().position(|name| name == plate) else { continue };
+        let share = (tint[at] * 256.0).round() as u32;
+        if share == 0 {
+            continue;
+        }
+        for (dot, &spot) in dots.iter_mut().zip(coverage).filter(|(_, spot)| **spot > 0) {
+            *dot = (u32::from(*dot) + (u32::from(spot) * share + 128) / 256).min(255) as u8;
+        }
+    }
+}
+
+impl Separated {
+    /// The smallest rectangle around everything drawn, in pixels; `None` for a blank page.
+    pub fn bounds(&self) -> Option<Window> {
+        let plates = self.plates.iter();
+        plates
+            .filter_map(|(.., coverage)| Window::around(coverage, self.size.0, 1, 0))
+            .chain(self.rest.iter().filter_map(|pixels| kinds::bounds(pixels, self.size.0)))
+            .reduce(|all, window| all.join(&window))
+    }
+
+    /// The part of the page in a window as art, a layer for each plate.
+    ///
+    /// # Errors
+    /// A window of no dots, or of more than 65535 on a side.
+    pub fn art(self, name: &str, window: &Window, options: &Options) -> Result<Artwork, Diagnosis> {
+        let empty = || wrong(Path::new(name), "the window has no dots");
+        let dots = size::page_dots((window.width, window.height), self.dpi).ok_or_else(empty)?;
+        Ok(self.art_of(name, window, dots, options))
+    }
+
+    /// The whole page as art, a dot for each pixel.
+    pub(super) fn whole(self, name: &str, options: &Options) -> Artwork {
+        let (width, height) = self.size;
+        self.art_of(name, &Window { left: 0, top: 0, width, height }, (width, height), options)
+    }
+
+    fn art_of(self, name: &str, window: &Window, dots: (usize, usize), options: &Options) -> Artwork {
+        // The plates were read from TIFF files, whose sides fit in u32.
+        let size = (window.width as u32, window.height as u32);
+        let mut art = match self.rest {
+            None => Artwork::blank(name, dots),
+            Some(pixels) => {
+                let pixels = window.cut(pixels, self.size.0, kinds::BYTES);
+                picture::opaque_artwork::<{ kinds::BYTES }>(name, name, size, dots, pixels, options)
+            }
+        };
+        if let Some(colour) = &mut art.colour {
+            colour.overprints = true;
+        }
+        for (plate, named, coverage) in self.plates {
+            let scan = Scan {
+                path: name.into(),
+                width: size.0,
+                height: size.1,
+                dpi: None,
+                coverage: window.cut(coverage, self.size.0, 1),
+                by: Coverage::Dark,
+            };
+            art.add(scan, &plate, named, true, options);
+        }
+        art.notes.extend(self.notes);
+        art
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_ghostscript_says_of_a_spot_becomes_shares() {
+        let said = "noise\n%%SeparationColor: \"Die \"line\"\" 100% ink = 0 32760 16380 0 CMYK\n";
+        assert_eq!(full_tint(said, "Die \"line\""), Some([0.0, 1.0, 0.5, 0.0]));
+        assert_eq!(full_tint(said, "Die"), None);
+        assert_eq!(full_tint("%%SeparationColor: \"a\" 100% ink = 0 x", "a"), None);
+    }
+
+    #[test]
+    fn a_spots_plate_is_added_in_its_shares_and_no_plate_overflows() {
+        let mut process: Vec<(String, Vec<u8>)> =
+            PROCESS.iter().map(|name| ((*name).to_owned(), vec![0, 100, 200])).collect();
+        add(&mut process, &[255, 100, 255], [0.0, 1.0, 0.5, 0.0]);
+        let of = |name: &str| process.iter().find(|(plate, _)| plate == name).unwrap().1.clone();
+        assert_eq!(of("Cyan"), [0, 100, 200]);
+        assert_eq!(of("Magenta"), [255, 200, 255]);
+        assert_eq!(of("Yellow"), [128, 150, 255]);
+    }
+}

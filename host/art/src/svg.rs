@@ -1,0 +1,240 @@
+//! SVG drawings: layers named after inks, or one picture.
+//!
+//! Problem: drawing programs have layers, which SVG stores as groups with a label or an identifier.
+//! Method: the drawing is rendered at its final number of dots without anti-aliasing. [`find`] tells which parts of it are
+//! layers. Each layer is rendered as the whole drawing without all others, so the clips, masks and transforms around it
+//! hold, and what is drawn in it is ink, whatever its colour. Only a layer to be halftoned has tones: there dark is ink,
+//! and so it is in pictures made of pixels. A drawing has no ground. Without layers it is one picture; its edges are exact,
+//! so reserved colours are unambiguous. Nothing drawn is thinner than a dot ([`thin`]). Rendering has a thread of its own,
+//! because filters may take for ever, and the renderer may fail on hostile drawings.
+//! Cost: four bytes a dot while a layer is rendered, eight where it holds pictures. Limits: animations do not run; a layer
+//! may take as long as a page ([`process::limit`]). A thread cannot be stopped: one that takes too long ends with the
+//! program.
+
+mod find;
+mod fonts;
+mod nodes;
+mod render;
+mod source;
+mod thin;
+mod write;
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::thread;
+
+use resvg::tiny_skia::Transform;
+use resvg::usvg::roxmltree;
+
+use super::artwork::Artwork;
+use super::coverage::{Coverage, Scan};
+use super::error::{io, nothing, wrong};
+use super::names::stem;
+use super::options::Options;
+use super::picture;
+use super::size::{self, Unstated};
+use super::svg_kinds;
+use crate::process;
+use find::Layer;
+use observe::{Diagnosis, Observer};
+use render::{Renderer, Without};
+use write::Way;
+
+pub(super) use source::is_svg;
+
+/// Name of the thread that renders a drawing. A panic in it becomes an error of the reader.
+pub const DRAWING: &str = "drawing";
+
+/// The most bytes of a drawing.
+const MOST_BYTES: u64 = 1 << 28;
+
+/// Units in an inch of a drawing without units.
+const UNITS: f64 = 96.0;
+
+/// Reads a drawing.
+pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, Diagnosis> {
+    let reading = io(path, "read it");
+    if std::fs::metadata(path).map_err(&reading)?.len() > MOST_BYTES {
+        return Err(wrong(path, format!("the drawing is larger than {} MB", MOST_BYTES >> 20)));
+    }
+    let text = source::decoded(path, std::fs::read(path).map_err(&reading)?)?;
+    let mut notes = Vec::new();
+    let layers = find::layers(path, &parsed(path, &text)?, &mut notes)?;
+    observer.begin("rendering layers", layers.len().max(1) as u64);
+    let (steps, done) = mpsc::channel();
+    let drawing = Drawing { path: path.to_path_buf(), text, layers, notes, options: options.clone() };
+    let begun = thread::Builder::new().name(DRAWING.into()).spawn(move || {
+        // Nobody listens any more if it took too long.
+        let drawn = drawing.draw(&|| drop(steps.send(None)));
+        let _ = steps.send(Some(drawn));
+    });
+    begun.map_err(io(path, "start a thread for it"))?;
+    let limit = process::limit();
+    let art = loop {
+        match done.recv_timeout(limit) {
+            Ok(None) => observer.advance(1),
+            Ok(Some(art)) => break art,
+            Err(RecvTimeoutError::Timeout) => break Err(wrong(path, process::too_long(limit))),
+            Err(RecvTimeoutError::Disconnected) => {
+                break Err(wrong(path, "the drawing cannot be rendered")
+                    .hint("simplify its filters, or export it as PNG"));
+            }
+        }
+    };
+    observer.end();
+    art
+}
+
+/// The elements of a drawing.
+fn parsed<'a>(path: &Path, text: &'a str) -> Result<roxmltree::Document<'a>, Diagnosis> {
+    let options = roxmltree::ParsingOptions { allow_dtd: true, ..Default::default() };
+    roxmltree::Document::parse_with_options(text, options).map_err(|error| {
+        let diagnosis = wrong(path, format!("the drawing cannot be read: {error}"));
+        match &error {
+            roxmltree::Error::UnknownNamespace(prefix, _) => diagnosis.hint(format!(
+                "open the drawing in Inkscape and save it again, or declare the prefix in its first element{}",
+                match prefix.as_str() {
+                    "inkscape" => ": xmlns:inkscape=\"http://www.inkscape.org/namespaces/inkscape\"",
+                    "sodipodi" => ": xmlns:sodipodi=\"http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd\"",
+                    "xlink" => ": xmlns:xlink=\"http://www.w3.org/1999/xlink\"",
+                    _ => "",
+                }
+            )),
+            _ => diagnosis,
+        }
+    })
+}
+
+/// A drawing on its way to its own thread.
+struct Drawing {
+    path: PathBuf,
+    text: String,
+    layers: Vec<Layer>,
+    notes: Vec<String>,
+    options: Options,
+}
+
+impl Drawing {
+    /// Renders it, and calls `advance` after each layer.
+    fn draw(self, advance: &dyn Fn()) -> Result<Artwork, Diagnosis> {
+        let Drawing { path, text, layers, mut notes, options } = self;
+        let path = path.as_path();
+        let document = parsed(path, &text)?;
+        let root = document.root_element();
+        let has = |name| root.descendants().any(|node| nodes::name(node) == Some(name));
+        let text = has("text");
+        if text {
+            notes.push(format!(
+                "{}: text is drawn with this computer's fonts; convert it to paths to keep its design",
+                path.display()
+            ));
+        }
+        let renderer = Renderer::new(path, text || links_drawing(root))?;
+        let whole = write::written(root, |_| Way::Keep);
+        let size = renderer.size(&whole)?;
+        if let Some(missing) = renderer.missing_fonts() {
+            notes.push(format!(
+                "{}: this computer has no font {missing}; install it, or convert the text to paths",
+                path.display()
+            ));
+        }
+        let (across, down) = (f64::from(size.width()), f64::from(size.height()));
+        let unstated = Unstated::Drawing { rounded_mm: 0.0 };
+        let dots = size::dots(path, (across, down), Some((UNITS, UNITS)), unstated, &options, &mut notes)?;
+        let scale = Transform::from_scale((dots.0 as f64 / across) as f32, (dots.1 as f64 / down) as f32);
+        let size = (dots.0 as u32, dots.1 as u32);
+
+        if layers.is_empty() {
+            let drawn = renderer.parsed(&whole, Without::Nothing)?;
+            let rgba = renderer.rendered(&drawn, scale, size)?;
+            let again = |without, has: bool| match has {
+                true => renderer.rendered(&renderer.parsed(&whole, without)?, scale, size).map(Some),
+                false => Ok(None),
+            };
+            let no_text = again(Without::Text, renderer.has_fonts())?;
+            let no_pictures = again(Without::Pictures, drawn.pictures)?;
+            let pixels = svg_kinds::tagged(&rgba, no_text.as_deref(), no_pictures.as_deref());
+            let mut art = picture::tagged_artwork(&stem(path), size, dots, pixels, &options);
+            art.notes.splice(..0, notes);
+            return Ok(art);
+        }
+        let mut art = Artwork::blank(&stem(path), dots);
+        for (at, layer) in layers.iter().enumerate() {
+            let text = write::written(root, find::only(&layers, at));
+            let drawn = renderer.parsed(&text, Without::Nothing)?;
+            let rgba = renderer.rendered(&drawn, scale, size)?;
+            advance();
+            if rgba.as_chunks::<4>().0.iter().all(|pixel| pixel[3] == 0) {
+                let name = &layer.label;
+                let why = match layer.hidden {
+                    true => "is hidden: left out; show it in the drawing program to print it",
+                    false => "is empty, or nothing in it is visible: left out",
+                };
+                notes.push(format!("{}: layer `{name}` {why}", path.display()));
+                continue;
+            }
+            let scan = if options.tones.contains(layer.named.ink) {
+                Scan::of_drawing(path, size, &rgba)
+            } else if drawn.pictures {
+                let shapes = renderer.parsed(&text, Without::Pictures)?;
+                let shapes = renderer.rendered(&shapes, scale, size)?;
+                with_pictures(path, size, rgba, &shapes, (&layer.label, &mut notes))
+            } else {
+                Scan::of_layer(path, size, &rgba)
+            };
+            art.add(scan, &layer.label, layer.named, false, &options);
+        }
+        if art.layers.is_empty() {
+            return Err(nothing(format!("no layer of {} is visible", path.display()))
+                .hint("show its layers in the drawing program, or draw something in them"));
+        }
+        art.opaque = Some(art.drawn.clone());
+        art.notes.append(&mut notes);
+        Ok(art)
+    }
+}
+
+/// Whether a drawing may hold another, whose text needs fonts.
+fn links_drawing(root: nodes::Node<'_, '_>) -> bool {
+    let drawing = |node: nodes::Node<'_, '_>| {
+        let mut links = node.attributes().filter(|a| a.name() == "href").map(|a| a.value());
+        links.any(|link| {
+            let raster = ["png", "jpg", "jpeg", "gif", "webp"];
+            let known = |kind: &&str| {
+                link.starts_with(&format!("data:image/{kind}")) || link.ends_with(&format!(".{kind}"))
+            };
+            !raster.iter().any(known)
+        })
+    };
+    root.descendants().any(|node| nodes::name(node) == Some("image") && drawing(node))
+}
+
+/// The coverage of a layer that holds pictures: `rgba` with them, `shapes` without. Shapes are ink whatever their colour;
+/// pictures are ink where they are dark, for scans have white paper.
+fn with_pictures(
+    path: &Path,
+    size: (u32, u32),
+    mut rgba: Vec<u8>,
+    shapes: &[u8],
+    (name, notes): (&str, &mut Vec<String>),
+) -> Scan {
+    let shapes = shapes.as_chunks::<4>().0;
+    for (pixel, shape) in rgba.as_chunks_mut::<4>().0.iter_mut().zip(shapes) {
+        if pixel == shape {
+            *pixel = [0; 4];
+        }
+    }
+    let mut scan = Scan::of_drawing(path, size, &rgba);
+    if shapes.iter().all(|shape| shape[3] == 0) {
+        return scan;
+    }
+    for (coverage, shape) in scan.coverage.iter_mut().zip(shapes) {
+        *coverage = (*coverage).max(shape[3]);
+    }
+    if scan.by == Coverage::DarkAndOpaque {
+        // The note on this rule would be wrong for the shapes.
+        scan.by = Coverage::Dark;
+        notes.push(format!("{name}: its pictures are ink where they are dark; all else drawn in it is ink"));
+    }
+    scan
+}

@@ -1,0 +1,99 @@
+//! Small files that appear whole or not at all, and settings and descriptions in TOML.
+//!
+//! A file is written beside its final place and renamed, so nobody ever reads half of one. A text is read up to 1 MB, so
+//! a file that is not one of ours cannot fill the memory. [`durable`] is for what has to outlive a crash.
+#![deny(unsafe_code)]
+
+pub mod durable;
+pub mod scratch;
+
+use std::io::{BufWriter, Read as _, Write};
+use std::path::{Path, PathBuf};
+
+/// The most bytes of a text.
+const MOST_TEXT: u64 = 1 << 20;
+
+/// Why a file cannot be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// The system refused; it says why.
+    #[error("{}: cannot be read or written", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A text file does not say what it should.
+    #[error("{}: {problem}", path.display())]
+    Text {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with the field.
+        problem: String,
+    },
+    /// A picture is no PNG, or damaged.
+    #[error("{}: the picture is damaged; write it again from its source", path.display())]
+    Png {
+        /// The file.
+        path: PathBuf,
+        /// What the decoder said.
+        source: png::DecodingError,
+    },
+    /// A picture is of another kind or size than the text beside it says.
+    #[error("{}: expected {expected}, found {found}", path.display())]
+    Kind {
+        /// The file.
+        path: PathBuf,
+        /// Size and kind expected.
+        expected: String,
+        /// Size and kind found.
+        found: String,
+    },
+}
+
+/// What the system said of a file, as an error.
+pub fn io(path: &Path) -> impl Fn(std::io::Error) -> FileError + '_ {
+    move |source| FileError::Io { path: path.to_path_buf(), source }
+}
+
+/// Writes a file beside its final place and renames it, so that no half-written file is ever seen.
+pub fn write(
+    path: &Path,
+    with: impl FnOnce(&mut BufWriter<&mut std::fs::File>) -> std::io::Result<()>,
+) -> Result<(), FileError> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".foilpress-");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // The user's umask decides, as for any other file; temporary files are private otherwise.
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let mut file = builder.tempfile_in(folder).map_err(io(folder))?;
+    let mut buffer = BufWriter::with_capacity(1 << 16, file.as_file_mut());
+    with(&mut buffer).and_then(|()| buffer.flush()).map_err(io(path))?;
+    drop(buffer);
+    file.persist(path).map_err(|error| io(path)(error.error))?;
+    Ok(())
+}
+
+/// Writes a value as TOML.
+pub fn write_toml(path: &Path, value: &impl serde::Serialize) -> Result<(), FileError> {
+    let text = toml::to_string(value)
+        .map_err(|error| FileError::Text { path: path.to_path_buf(), problem: error.to_string() })?;
+    write(path, |out| out.write_all(text.as_bytes()))
+}
+
+/// Reads TOML of at most a megabyte; unknown fields are the type's own business.
+pub fn read_toml<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, FileError> {
+    let wrong = |problem: String| FileError::Text { path: path.to_path_buf(), problem };
+    let file = std::fs::File::open(path).map_err(io(path))?;
+    let mut text = String::new();
+    file.take(MOST_TEXT + 1).read_to_string(&mut text).map_err(io(path))?;
+    if text.len() as u64 > MOST_TEXT {
+        return Err(wrong(format!("more than {MOST_TEXT} bytes")));
+    }
+    toml::from_str(&text).map_err(|error| wrong(error.to_string().trim_end().to_string()))
+}

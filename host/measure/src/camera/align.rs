@@ -1,0 +1,330 @@
+//! How two photographs of a series compare: the shift between them, and the ratio of their exposures.
+//!
+//! Problem: a hand on the camera shifts it, and shutters are off by some per cent. Method: after the right shift the logarithms of both
+//! differ by a constant, where neither is full. To both lights the same little is added, so that what is dark in both agrees and the
+//! edges of bright things count. A search over whole pixels of a small copy is followed by Lucas and Kanade's least squares (1981)
+//! with the constant as a third unknown. Cost: some million comparisons a pair. Limits: shifts only; a camera that was turned does
+//! not match.
+
+use super::probe::{CLIPPED, Noise, Probe};
+use super::response::Response;
+use crate::linalg::{Cholesky, spread};
+
+/// How far shifts are searched, in picture widths.
+const SEARCH: f64 = 0.06;
+/// Pixels across the copy that is searched.
+const COARSE: usize = 160;
+/// Tones are used from so many standard deviations of their noise.
+const CERTAIN: f32 = 12.0;
+/// A difference of logarithms that noise and edges do not explain.
+const STRANGE: f64 = 0.15;
+/// What is added to light, in parts of the tone from which the ratio of exposures is taken.
+const CLEAR: f64 = 6.0;
+/// Weight of standing still, in squared differences per squared pixel: without edges a shift cannot be seen.
+const STILL: f64 = 0.1;
+
+/// The light of each block of a small copy.
+pub(crate) struct Tones {
+    width: usize,
+    height: usize,
+    factor: usize,
+    /// Not a number where it is full.
+    light: Vec<f32>,
+    /// The least that it is.
+    least: Vec<f32>,
+    /// Light that noise does not hide.
+    floor: f32,
+}
+
+/// How a photograph compares with another.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Match {
+    /// What is at x in the first is at x + shift in the second, in pixels of the photographs.
+    pub(crate) shift: [f64; 2],
+    /// Logarithm of the light of the second over the first.
+    pub(crate) ratio: f64,
+    /// Standard error of the ratio.
+    pub(crate) error: f64,
+    /// How much the ratio differs between dark and bright tones.
+    pub(crate) bend: f64,
+    /// The part of the compared blocks that do not agree.
+    pub(crate) strange: f64,
+    /// Blocks that could be compared.
+    pub(crate) compared: usize,
+}
+
+impl Tones {
+    pub(crate) fn new(
+        probe: &Probe,
+        response: &Response,
+        noise: Noise,
+        white: [f32; 3],
+        exposure: f64,
+    ) -> Tones {
+        let blocks = (probe.factor * probe.factor) as f32;
+        let time = exposure as f32;
+        let least: Vec<f32> = probe
+            .mean
+            .iter()
+            .map(|mean| (0..3).map(|c| response.linear(c, mean[c])).sum::<f32>().max(0.0) / time)
+            .collect();
+        let full = |most: &[f32; 3]| (0..3).any(|c| most[c] >= CLIPPED * white[c]);
+        let light =
+            least.iter().zip(&probe.most).map(|(l, most)| if full(most) { f32::NAN } else { *l }).collect();
+        // Where the noise of three channels is a twelfth of the value, for values with shot and read noise.
+        let (gain, read) = (noise.gain, 3.0 * noise.read);
+        let certain = CERTAIN * CERTAIN / blocks;
+        let value = 0.5 * (certain * gain + (certain * gain * certain * gain + 4.0 * certain * read).sqrt());
+        let value = value.max(0.004 * white[1].min(65_535.0));
+        let floor = (0..3).map(|c| response.linear(c, value / 3.0)).sum::<f32>() / time;
+        Tones { width: probe.width, height: probe.height, factor: probe.factor, light, least, floor }
+    }
+
+    fn halved(&self) -> Tones {
+        let (width, height) = (self.width / 2, self.height / 2);
+        let pooled = |values: &[f32]| -> Vec<f32> {
+            (0..width * height)
+                .map(|i| {
+                    let at = 2 * (i / width) * self.width + 2 * (i % width);
+                    (values[at] + values[at + 1] + values[at + self.width] + values[at + self.width + 1])
+                        / 4.0
+                })
+                .collect()
+        };
+        let (light, least) = (pooled(&self.light), pooled(&self.least));
+        Tones { width, height, factor: 2 * self.factor, light, least, floor: self.floor }
+    }
+
+    /// The logarithm of light with a little added, softened so that edges are wider than a step of the method.
+    fn logs(&self, little: f32) -> Logs {
+        let logs = |ln: Vec<f32>| Logs { width: self.width, height: self.height, ln };
+        let sharp = logs(self.light.iter().map(|l| (l + little).ln()).collect());
+        let soft = |i: usize| {
+            let (x, y) = ((i % self.width) as i64, (i / self.width) as i64);
+            let row = |y: i64| (sharp.at(x - 1, y) + 2.0 * sharp.at(x, y) + sharp.at(x + 1, y)) / 4.0;
+            ((row(y - 1) + 2.0 * row(y) + row(y + 1)) / 4.0) as f32
+        };
+        logs((0..self.light.len()).map(soft).collect())
+    }
+
+    /// Compares this photograph with another one of the same size.
+    pub(crate) fn compare(&self, other: &Tones) -> Match {
+        let little = self.floor.max(other.floor);
+        let (a, b) = (self.logs(little), other.logs(little));
+        let mut copies = (self.halved(), other.halved());
+        while copies.0.width > COARSE {
+            copies = (copies.0.halved(), copies.1.halved());
+        }
+        let scale = copies.0.factor as f64 / self.factor as f64;
+        let mut shift = search(&copies.0.logs(little), &copies.1.logs(little)).map(|d| d * scale);
+        let mut ratio = 0.0;
+        for round in 0..12 {
+            let step = a.step(&b, shift, ratio, round);
+            shift = [shift[0] + step[0], shift[1] + step[1]];
+            ratio += step[2];
+            if step[0].abs() + step[1].abs() < 1e-4 {
+                break;
+            }
+        }
+        self.judge(other, (&a, &b), little, shift)
+    }
+
+    /// What is left of the differences after the shift.
+    fn judge(&self, other: &Tones, (a, b): (&Logs, &Logs), little: f32, shift: [f64; 2]) -> Match {
+        // Light, difference, slope.
+        let mut all: Vec<(f64, f64, f64)> = Vec::new();
+        let (mut bounded, mut broken) = (0, 0);
+        for y in 1..self.height as i64 - 1 {
+            for x in 1..self.width as i64 - 1 {
+                let (u, v) = (x as f64 + shift[0], y as f64 + shift[1]);
+                let (here, there) = (a.at(x, y), b.between(u, v));
+                let near = [(1, 0), (-1, 0), (0, 1), (0, -1)];
+                let slope = |logs: &Logs, x: i64, y: i64| {
+                    near.iter()
+                        .map(|(i, j)| (logs.at(x + i, y + j) - logs.at(x, y)).abs())
+                        .fold(0.0, f64::max)
+                };
+                if here.is_finite() && there.is_finite() {
+                    all.push((here, there - here, slope(a, x, y)));
+                    continue;
+                }
+                // One of them is full, which gives the other a least value.
+                let (i, j) = (u.round(), v.round());
+                let inside =
+                    i >= 1.0 && j >= 1.0 && i < self.width as f64 - 1.0 && j < self.height as f64 - 1.0;
+                if !inside || (here.is_nan() && there.is_nan()) {
+                    continue;
+                }
+                let bound = |tones: &Tones, x: usize, y: usize| {
+                    f64::from((tones.least[y * tones.width + x] + little).ln())
+                };
+                let (value, least, slope) = if there.is_nan() {
+                    (here, bound(other, i as usize, j as usize), slope(a, x, y))
+                } else {
+                    (there, bound(self, x as usize, y as usize), slope(b, i as i64, j as i64))
+                };
+                bounded += 1;
+                broken += usize::from(slope.is_finite() && value < least - 2.0 * (STRANGE + slope));
+            }
+        }
+        let clear = f64::from(((CLEAR as f32 + 1.0) * little).ln());
+        // Without the little: both are far above it.
+        let plain = |l: f64| (l.exp() - f64::from(little)).max(1e-30).ln();
+        let smooth: Vec<(f64, f64)> = all
+            .iter()
+            .filter(|d| d.2 < 0.15 && d.0 > clear && d.0 + d.1 > clear)
+            .map(|d| (d.0, plain(d.0 + d.1) - plain(d.0)))
+            .collect();
+        let differences: Vec<f64> = smooth.iter().map(|d| d.1).collect();
+        let (middle, width) = spread(&differences);
+        let mut near: Vec<(f64, f64)> =
+            smooth.into_iter().filter(|d| (d.1 - middle).abs() < 3.0 * width.max(1e-6)).collect();
+        let mean = |part: &[(f64, f64)]| part.iter().map(|d| d.1).sum::<f64>() / part.len().max(1) as f64;
+        let ratio = if near.is_empty() { middle } else { mean(&near) };
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let third = near.len() / 3;
+        let bend = if third > 50 { mean(&near[near.len() - third..]) - mean(&near[..third]) } else { 0.0 };
+        // What is dark in both says nothing.
+        let told: Vec<&(f64, f64, f64)> =
+            all.iter().filter(|d| d.0.max(d.0 + d.1) > f64::from((2.0 * little).ln())).collect();
+        let doubt = STRANGE + 4.0 * width.min(0.1);
+        let strange = told.iter().filter(|d| (d.1 - ratio).abs() > doubt + d.2).count() + broken;
+        Match {
+            shift: shift.map(|d| d * self.factor as f64),
+            ratio,
+            error: width / (near.len().max(1) as f64).sqrt(),
+            bend,
+            strange: strange as f64 / (told.len() + bounded).max(1) as f64,
+            compared: near.len(),
+        }
+    }
+}
+
+/// A small copy of logarithms.
+struct Logs {
+    width: usize,
+    height: usize,
+    ln: Vec<f32>,
+}
+
+impl Logs {
+    fn at(&self, x: i64, y: i64) -> f64 {
+        let inside = (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y);
+        if inside { f64::from(self.ln[y as usize * self.width + x as usize]) } else { f64::NAN }
+    }
+
+    fn between(&self, x: f64, y: f64) -> f64 {
+        let (x0, y0) = (x.floor(), y.floor());
+        let (u, v) = (x - x0, y - y0);
+        let at = |i: i64, j: i64| self.at(x0 as i64 + i, y0 as i64 + j);
+        // On a whole pixel the next one does not count, and may be missing.
+        let row = |j: i64| if u < 1e-6 { at(0, j) } else { at(0, j) * (1.0 - u) + at(1, j) * u };
+        if v < 1e-6 { row(0) } else { row(0) * (1.0 - v) + row(1) * v }
+    }
+
+    /// One step of Gauss and Newton: changes of shift and ratio that explain the differences best.
+    fn step(&self, other: &Logs, shift: [f64; 2], ratio: f64, round: usize) -> [f64; 3] {
+        let (mut a, mut b) = ([0.0f64; 9], [-STILL * shift[0], -STILL * shift[1], 0.0]);
+        let limit = if round < 3 { 1.5 } else { 0.5 };
+        for y in 1..self.height as i64 - 1 {
+            for x in 1..self.width as i64 - 1 {
+                let found = other.between(x as f64 + shift[0], y as f64 + shift[1]);
+                let difference = found - self.at(x, y) - ratio;
+                let g = [
+                    (self.at(x + 1, y) - self.at(x - 1, y)) / 2.0,
+                    (self.at(x, y + 1) - self.at(x, y - 1)) / 2.0,
+                    -1.0,
+                ];
+                if !(difference.is_finite() && g[0].is_finite() && g[1].is_finite())
+                    || difference.abs() > limit + 2.0 * g[0].abs().max(g[1].abs())
+                {
+                    continue;
+                }
+                for i in 0..3 {
+                    for j in 0..3 {
+                        a[3 * i + j] += g[i] * g[j];
+                    }
+                    b[i] -= g[i] * difference;
+                }
+            }
+        }
+        a[0] += STILL;
+        a[4] += STILL;
+        let Some(factors) = Cholesky::new(&a, 3) else { return [0.0; 3] };
+        let x = factors.solve(&b);
+        [x[0].clamp(-2.0, 2.0), x[1].clamp(-2.0, 2.0), x[2]]
+    }
+}
+
+/// The shift in whole pixels with the smallest differences.
+fn search(a: &Logs, b: &Logs) -> [f64; 2] {
+    let reach = (SEARCH * a.width as f64).ceil() as i64;
+    let mut tried: Vec<(usize, f64, [f64; 2])> = Vec::new();
+    for dy in -reach..=reach {
+        for dx in -reach..=reach {
+            let (mut n, mut squares) = (0usize, 0.0f64);
+            for y in 0..a.height as i64 {
+                for x in 0..a.width as i64 {
+                    let d = b.at(x + dx, y + dy) - a.at(x, y);
+                    if d.is_finite() {
+                        n += 1;
+                        squares += d.clamp(-1.0, 1.0).powi(2);
+                    }
+                }
+            }
+            // Among equals the smallest shift.
+            let far = 1e-6 * (dx * dx + dy * dy) as f64;
+            tried.push((n, squares / n.max(1) as f64 + far, [dx as f64, dy as f64]));
+        }
+    }
+    let most = tried.iter().map(|t| t.0).max().unwrap_or(0);
+    let enough = tried.iter().filter(|t| 2 * t.0 > most && t.0 > 20);
+    enough.min_by(|a, b| a.1.total_cmp(&b.1)).map_or([0.0; 2], |t| t.2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::photo::{Photo, Values};
+
+    /// Soft discs on a ground, moved by a shift, at an exposure.
+    fn scene(shift: [f64; 2], exposure: f64, other: f64) -> Tones {
+        let (width, height) = (320, 240);
+        let values = (0..width * height)
+            .flat_map(|i| {
+                let (x, y) = ((i % width) as f64 - shift[0], (i / width) as f64 - shift[1]);
+                let disc =
+                    |cx: f64, cy: f64, r: f64| 1.0 / (1.0 + (((x - cx).hypot(y - cy) - r) / 1.5).exp());
+                let light = 0.05
+                    + 0.3 * disc(90.0, 100.0, 40.0)
+                    + 0.2 * disc(220.0, 140.0, 30.0 * other)
+                    + 0.0004 * x;
+                [(light * exposure * 60_000.0).clamp(0.0, 65_535.0) as u16; 3]
+            })
+            .collect();
+        let probe = Probe::new(&Photo { width, height, values: Values::Sixteen(values) });
+        Tones::new(&probe, &Response::Linear, Noise { gain: 1.0, read: 4.0 }, [65_535.0; 3], exposure)
+    }
+
+    #[test]
+    fn a_shift_and_a_ratio_are_found_between_pixels() {
+        let first = scene([0.0, 0.0], 1.0, 1.0);
+        for shift in [[0.0, 0.0], [0.5, -0.3], [3.3, 2.6], [-12.4, 7.0]] {
+            let found = first.compare(&scene(shift, 0.5 * 1.03, 1.0));
+            assert!(
+                (found.shift[0] - shift[0]).abs() < 0.05 && (found.shift[1] - shift[1]).abs() < 0.05,
+                "{found:?}"
+            );
+            assert!(
+                found.ratio.abs() < 0.002 && found.strange < 0.01 && found.compared > 10_000,
+                "{found:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn another_scene_is_strange() {
+        let found = scene([0.0, 0.0], 1.0, 1.0).compare(&scene([0.0, 0.0], 0.5, 2.0));
+        assert!(found.strange > 0.05, "{found:?}");
+    }
+}

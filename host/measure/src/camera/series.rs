@@ -1,0 +1,82 @@
+//! The photographs of a folder as one series of exposures for each lamp, and what a series lacks.
+//!
+//! A photograph belongs to the lamp that its name begins with; its exposure time is that of the setup file, or that of EXIF. Photographs
+//! of no lamp or without a time are errors, as are lamps without photographs. What more exposures would show is advice.
+
+use std::path::Path;
+
+use super::merge::{Exposure, Shot};
+use super::photo;
+use crate::MeasureError;
+use crate::setup::Setup;
+
+/// Photographs with their exposure times, for each lamp of the setup.
+pub(crate) fn series(folder: &Path, setup: &Setup) -> Result<Vec<Vec<Exposure>>, MeasureError> {
+    let mut series: Vec<Vec<Exposure>> = vec![Vec::new(); setup.light.len()];
+    let mut named: Vec<&String> = setup.exposures.keys().collect();
+    for path in photo::list(folder)? {
+        let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        let Some(light) = setup.light.iter().position(|light| name.starts_with(&light.photos)) else {
+            let beginnings: Vec<&str> = setup.light.iter().map(|light| &*light.photos).collect();
+            let problem = format!(
+                "belongs to no lamp: its name begins with none of {}; rename it, or change light.photos",
+                beginnings.join(", ")
+            );
+            return Err(MeasureError::photo(&path, problem));
+        };
+        let exif = photo::exif(&path)?;
+        named.retain(|other| **other != name);
+        let seconds =
+            setup.exposures.get(&name).copied().or(exif.seconds).filter(|t| t.is_finite() && *t > 0.0);
+        let Some(seconds) = seconds else {
+            return Err(MeasureError::photo(
+                &path,
+                format!(
+                    "has no exposure time; keep the camera's EXIF, or add `\"{name}\" = 0.004` (seconds) to [exposures] in the setup file"
+                ),
+            ));
+        };
+        series[light].push(Exposure { path, seconds, exif });
+    }
+    if let Some(name) = named.first() {
+        return Err(MeasureError::Scene(format!(
+            "setup file: exposures names {name}, which is not in {}; correct the name",
+            folder.display()
+        )));
+    }
+    match series.iter().position(Vec::is_empty) {
+        Some(empty) => Err(MeasureError::Scene(format!(
+            "light {}: no photograph's name begins with `{}`; photograph it, or take it out of the setup file",
+            empty + 1,
+            setup.light[empty].photos
+        ))),
+        None => Ok(series),
+    }
+}
+
+/// Relative exposures of a series.
+pub(crate) fn exposures(shots: &[Shot]) -> Vec<f64> {
+    shots.iter().map(|shot| shot.seconds * shot.ratio).collect()
+}
+
+/// What exposures a second try needs under lamp `lamp`: `clipped` are the stacks whose highlight even the shortest does not show.
+pub(crate) fn advice(shots: &[Shot], lamp: usize, clipped: &[&str]) -> Vec<String> {
+    let mut again = Vec::new();
+    if !clipped.is_empty() {
+        let shortest = shots.last().map_or(0.0, |shot| shot.seconds);
+        again.push(format!(
+            "{}: the highlight is clipped even at {}: add exposures 4 and 16 times as short",
+            clipped.join(", "),
+            seconds(shortest)
+        ));
+    }
+    if shots.len() == 1 {
+        again.push(format!("lamp {lamp}: one exposure only: take at least three, a factor of 4 apart"));
+    }
+    again
+}
+
+/// A time as photographers write it.
+pub(crate) fn seconds(time: f64) -> String {
+    if time < 0.4 { format!("1/{:.0} s", 1.0 / time) } else { format!("{time:.1} s") }
+}

@@ -1,0 +1,3 @@
+//! The stages from outside.
+
+mod damaged_stages;

@@ -1,0 +1,198 @@
+//! Arguments that several subcommands share, and the settings they mean.
+
+pub mod choice;
+pub mod document_dots;
+pub mod layout;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, bail};
+use clap::Args;
+use inks::{InkSet, InkSetError, Library, Trust};
+
+use appearance::document::{self, ColourSpace, Document};
+use appearance::factor::{self, Method};
+use appearance::gamut::{self, Intent};
+
+use crate::cli::arguments::choice::{Metric, choice, name, utf8, whole};
+use crate::cli::console::usage;
+use crate::libraries;
+use observe::Observer;
+
+/// What to read.
+#[derive(Args, Debug)]
+pub struct DocumentArgs {
+    /// Document: a folder of texture maps, a .gltf or .glb file, a measured BRDF (.binary, .bsdf, .brdf, .csv), a
+    /// .foil folder, or sample:NAME
+    #[arg(value_name = "DOC", value_parser = utf8())]
+    pub document: String,
+    /// Material of a glTF file, by number (from 0) or name [default: the only one]
+    #[arg(long, value_name = "NUMBER|NAME")]
+    pub material: Option<String>,
+    /// Encoding of the colour maps [default: the usual one of their file format]
+    #[arg(long, value_name = "SPACE", value_parser = choice::<ColourSpace>())]
+    pub colour_space: Option<ColourSpace>,
+    /// Number of angles at which each reflectance curve is sampled, 32 to 512; 32 is enough for anything printable
+    #[arg(long, default_value_t = document::SAMPLES, value_parser = whole(32..=512usize))]
+    pub samples: usize,
+}
+
+impl DocumentArgs {
+    /// Opens the document. The reader notes to the observer what it had to assume.
+    pub fn open(&self, observer: &dyn Observer) -> Result<Document> {
+        let options = document::Options {
+            material: self.material.clone(),
+            colour_space: self.colour_space,
+            samples: self.samples,
+        };
+        let mut document = match document::open(&self.document, &options, observer) {
+            Ok(document) => document,
+            Err(error) if art::is_art(Path::new(&self.document)) => {
+                return Err(anyhow::Error::new(error).context(format!(
+                    "{0} is artwork, not a document of materials: `foilpress layers {0}` prints it, `foilpress plan layers {0}` plans it",
+                    self.document
+                )));
+            }
+            Err(error @ document::DocumentError::Choice { .. }) => bail!("{error} (--material)"),
+            Err(error) => return Err(error.into()),
+        };
+        // The name may come from a file of unknown origin, and it is shown on the terminal.
+        document.name.retain(|c| !c.is_control());
+        if document.name.trim().is_empty() {
+            document.name = "document".into();
+        }
+        Ok(document)
+    }
+}
+
+/// How to factor the document.
+#[derive(Args, Debug)]
+pub struct FactorArgs {
+    /// Number of bases, where the intent uses them [default: as many as the document needs]
+    #[arg(long, value_parser = whole(1..=factor::MOST_BASES))]
+    pub bases: Option<usize>,
+    /// Method that finds the bases: archetypes, or the paper's kmeans (convex hull) and sacls
+    #[arg(long = "factor", value_name = "METHOD", default_value = "archetypes", value_parser = choice::<Method>())]
+    pub method: Method,
+    /// Seed of all random choices; equal seeds give equal prints
+    #[arg(long, default_value_t = FactorArgs::SEED)]
+    pub seed: u64,
+}
+
+impl FactorArgs {
+    /// The seed unless another is given.
+    pub const SEED: u64 = 1;
+
+    /// Whether something about the bases was chosen.
+    pub fn is_chosen(&self) -> bool {
+        self.bases.is_some() || self.method != Method::default()
+    }
+
+    /// The settings meant.
+    pub fn settings(&self) -> factor::FactorSettings {
+        factor::FactorSettings {
+            method: self.method,
+            bases: self.bases,
+            seed: self.seed,
+            ..factor::FactorSettings::default()
+        }
+    }
+}
+
+/// What to print with.
+#[derive(Args, Clone, Debug)]
+pub struct InkArgs {
+    /// Inks to print with, such as process,MS or -finish [default: all but the foils]
+    ///
+    /// Names and the groups process, metallic, clear, foil, default, all, separated by commas; a leading - removes one from the
+    /// default.
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub inks: Option<String>,
+    /// Your own ink library: its folder, or the name it was added under [default: the built-in library]
+    #[arg(long, value_name = "LIBRARY")]
+    pub library: Option<PathBuf>,
+    /// Curves of the library to rely on; stacks with other curves are not printed. Bare paper is always there
+    #[arg(long, value_name = "CURVES", default_value = "all", value_parser = choice::<Trust>())]
+    pub trust: Trust,
+}
+
+impl InkArgs {
+    /// These inks of this library, whatever the origin of its curves.
+    pub fn of(inks: Option<String>, library: Option<PathBuf>) -> InkArgs {
+        InkArgs { inks, library, trust: Trust::All }
+    }
+
+    /// The inks to print with and the library, which has at least one stack of them.
+    pub fn at_hand(&self) -> Result<(InkSet, Library)> {
+        let (set, library) = (self.set()?, self.library()?);
+        let none =
+            |library: &Library| library.at_hand(&set).iter().all(|entry| entry.stack.layers().is_empty());
+        if self.trust != Trust::All && none(&library) && !none(&library.clone().trusting(Trust::All)) {
+            bail!(
+                "--trust {}: the library has no such curve of a stack made only of {set}; `foilpress inks list` says where each \
+                 curve comes from",
+                name(self.trust)
+            );
+        }
+        if none(&library) {
+            bail!(
+                "--inks: the library has no stack made only of {set}; `foilpress inks list` shows the stacks it has"
+            );
+        }
+        Ok((set, library))
+    }
+
+    fn set(&self) -> Result<InkSet> {
+        let set: InkSet = match &self.inks {
+            Some(text) => text.parse().map_err(|error: InkSetError| usage(format!("--inks: {error}")))?,
+            None => InkSet::default(),
+        };
+        if set.is_empty() {
+            return Err(usage("--inks leaves no ink to print with"));
+        }
+        Ok(set)
+    }
+
+    /// The library, trusted as far as was asked.
+    pub fn library(&self) -> Result<Library> {
+        Ok(libraries::given(self.library.as_deref())?.trusting(self.trust))
+    }
+}
+
+/// How mixtures become dots.
+#[derive(Args, Debug)]
+pub struct HalftoneArg {
+    /// How the stack of each dot is chosen where the art has tones; solid dots are printed as they are
+    #[arg(long, value_name = "METHOD", default_value = "cells", value_parser = choice::<halftone::Method>())]
+    pub halftone: halftone::Method,
+}
+
+/// How to map materials to the inks.
+#[derive(Args, Debug)]
+pub struct GamutArgs {
+    /// How to treat materials that no ink can make
+    ///
+    /// basis keeps their differences (the paper's way), clamp keeps each one as close as possible, blend lies between, contrast
+    /// keeps differences between neighbours, auto clamps unless that would make different materials look alike that blend keeps
+    /// apart.
+    #[arg(long, value_name = "INTENT", default_value = "auto", value_parser = choice::<Intent>())]
+    pub intent: Intent,
+    /// What "close" means
+    ///
+    /// light counts how much light a material returns beside the shape of its highlight, so that metals shine; paper is the
+    /// distance of the 2009 paper, which counts the shape alone.
+    #[arg(long, value_name = "METRIC", default_value = "light", value_parser = choice::<Metric>())]
+    pub metric: Metric,
+}
+
+impl GamutArgs {
+    /// The settings meant.
+    pub fn settings(&self, seed: u64) -> gamut::GamutSettings {
+        gamut::GamutSettings {
+            intent: self.intent,
+            light: self.metric.light(),
+            seed,
+            ..gamut::GamutSettings::default()
+        }
+    }
+}

@@ -1,0 +1,256 @@
+//! `foilpress chart`: sheets made to look at, to measure inks and to calibrate the printer.
+
+use anyhow::{Context, Result, bail};
+use clap::{Args as ClapArgs, Subcommand};
+use inks::{InkSet, Library, Stack};
+use protocol::ink::Ink;
+use serde_json::Value;
+
+use crate::cli::arguments::layout::MediaArgs;
+use crate::cli::arguments::{HalftoneArg, InkArgs};
+use crate::cli::printing::deliver::DeliverArgs;
+use crate::cli::printing::{Artwork, JobArgs, ResultArgs};
+use art::names::typed;
+use observe::Observer;
+use press::chart;
+use press::layout::{Layout, paper};
+use press::separate::MOST_CARTRIDGES;
+use sheet::DotMap;
+
+/// Arguments of `chart`.
+#[derive(ClapArgs, Debug)]
+#[command(after_help = "Examples:\n  \
+    foilpress chart ramp silver-foil metallic-silver     (figure 2 of the paper)\n  \
+    foilpress chart ladder                               (figure 5: four levels of gloss, MS+F to MS)\n  \
+    foilpress chart ladder C+M+Y+F C+M+Y\n  \
+    foilpress chart halftone                             (black on paper by each halftone)\n  \
+    foilpress chart stacks --inks process,MS,F           (a labelled patch of each stack, to measure)\n  \
+    foilpress chart stacks --inks MS,C,F --strips        (strips to wrap round a can)\n  \
+    foilpress chart registration --inks black,cyan,white\n  \
+    foilpress chart calibration --to serial:/dev/ttyACM0")]
+pub struct Args {
+    #[command(subcommand)]
+    chart: Chart,
+}
+
+#[derive(Subcommand, Debug)]
+enum Chart {
+    /// Print a halftoned ramp from one stack to another, clusters of 1 to 24 dots of both for `measure ramp`, and a checkerboard
+    /// to hold so that the ramp reflects it
+    Ramp(Ramp),
+    /// Print four levels of gloss between a glossy and a dull stack, both clamped and with their differences kept
+    Ladder(Ladder),
+    /// Print a ramp and flat patches by each halftone side by side, to see how they differ
+    Halftone(Halftone),
+    /// Print a labelled patch of every stack that the chosen inks can make
+    Stacks(Stacks),
+    /// Print verniers between the first ink and each other ink, to see how far apart passes land, with marks for
+    /// `measure registration`
+    Registration(Registration),
+    /// Print two crosses to measure with a ruler, for `foilpress profile set`: where this printer prints and how far it
+    /// feeds
+    Calibration(Calibration),
+}
+
+#[derive(ClapArgs, Debug)]
+struct Ramp {
+    /// Stack on the left: short or long names of inks joined by +, from the bottom, such as MS or MS+C
+    first: Stack,
+    /// Stack on the right
+    second: Stack,
+    #[command(flatten)]
+    halftone: HalftoneArg,
+    #[command(flatten)]
+    step: StepArgs,
+}
+
+/// What charts between two stacks share.
+#[derive(ClapArgs, Debug)]
+struct StepArgs {
+    /// Your own ink library: its folder, or the name it was added under [default: the built-in library]
+    #[arg(long, value_name = "LIBRARY")]
+    library: Option<std::path::PathBuf>,
+    #[command(flatten)]
+    job: JobArgs,
+}
+
+#[derive(ClapArgs, Debug)]
+struct Ladder {
+    /// Glossier stack: short or long names of inks joined by +, from the bottom
+    #[arg(default_value = "MS+F", requires = "dull")]
+    glossy: Stack,
+    /// Duller stack
+    #[arg(default_value = "MS")]
+    dull: Stack,
+    #[command(flatten)]
+    halftone: HalftoneArg,
+    #[command(flatten)]
+    step: StepArgs,
+}
+
+#[derive(ClapArgs, Debug)]
+struct Halftone {
+    /// First stack: short or long names of inks joined by +, from the bottom
+    #[arg(default_value = "K", requires = "second")]
+    first: Stack,
+    /// Second stack; substrate is the bare paper
+    #[arg(default_value = "substrate")]
+    second: Stack,
+    #[command(flatten)]
+    step: StepArgs,
+}
+
+#[derive(ClapArgs, Debug)]
+struct Stacks {
+    #[command(flatten)]
+    inks: InkArgs,
+    /// Print strips of 90 x 12 mm, one below the other, to wrap round a can
+    #[arg(long)]
+    strips: bool,
+    #[command(flatten)]
+    job: JobArgs,
+}
+
+#[derive(ClapArgs, Debug)]
+struct Registration {
+    /// Inks, separated by commas; the first is compared with each of the others
+    #[arg(long, value_name = "INKS", value_delimiter = ',', default_value = "black,cyan,magenta,yellow", value_parser = typed)]
+    inks: Vec<Ink>,
+    #[command(flatten)]
+    whole: WholePage,
+}
+
+#[derive(ClapArgs, Debug)]
+struct Calibration {
+    /// Ink to print with
+    #[arg(long, default_value = "black", value_parser = typed)]
+    ink: Ink,
+    #[command(flatten)]
+    whole: WholePage,
+}
+
+/// Charts of the whole printable area have no layout but their paper, and measure the printer as it is.
+#[derive(ClapArgs, Debug)]
+struct WholePage {
+    /// Paper size: a4, letter, legal, executive, b5, postcard, or the size of the sheet such as 120x180mm
+    #[arg(long, default_value = "a4", value_parser = paper::read)]
+    paper: protocol::paper::Paper,
+    #[command(flatten)]
+    media: MediaArgs,
+    #[command(flatten)]
+    result: ResultArgs,
+    #[command(flatten)]
+    deliver: DeliverArgs,
+}
+
+/// Inks of `chart stacks` when none are named: as many as the printer holds.
+const USUAL: &str = "process,metallic-silver,metallic-gold,finish";
+
+/// Runs `chart`.
+pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
+    match &args.chart {
+        Chart::Ramp(Ramp { first, second, halftone, step }) => {
+            let make = |library: &Library| chart::ramp(first, second, halftone.halftone, library, observer);
+            step.run("ramp", chart::ramp::parts().size, make, [first, second], observer)
+        }
+        Chart::Ladder(Ladder { glossy, dull, halftone, step }) => {
+            let make = |library: &Library| chart::ladder(glossy, dull, halftone.halftone, library, observer);
+            step.run("ladder", chart::size_of_ladder(), make, [glossy, dull], observer)
+        }
+        Chart::Halftone(Halftone { first, second, step }) => {
+            let make = |library: &Library| chart::halftones(first, second, library, observer);
+            step.run("halftone", chart::size_of_halftones(first, second), make, [first, second], observer)
+        }
+        Chart::Stacks(stacks) => {
+            let usual = InkArgs { inks: Some(USUAL.into()), ..stacks.inks.clone() };
+            let (set, library) = if stacks.inks.inks.is_some() { &stacks.inks } else { &usual }.at_hand()?;
+            if set.len() > MOST_CARTRIDGES {
+                bail!(
+                    "--inks: {} inks, but the printer holds {MOST_CARTRIDGES} cartridges; print several charts, each of some \
+                     inks, such as --inks {USUAL}",
+                    set.len()
+                );
+            }
+            let all: Vec<Stack> = library.at_hand(&set).iter().map(|entry| entry.stack.clone()).collect();
+            let dots = chart::stacks(&all, stacks.job.layout.paper, stacks.strips)?;
+            let layout = layout(&stacks.job, observer)?;
+            chart::check_room("stacks", (dots.width(), dots.length()), &layout)?;
+            let artwork = artwork("stacks", &dots, set, &library);
+            print(&artwork, &layout, &stacks.job, observer)
+        }
+        Chart::Registration(registration) => {
+            let inks = &registration.inks;
+            if let Some(twice) = inks.iter().enumerate().find(|(i, ink)| inks[..*i].contains(ink)) {
+                bail!("--inks: {} is given twice", twice.1.name());
+            }
+            let dots = chart::registration(inks, registration.whole.paper)?;
+            registration.whole.print("registration", &dots, inks, true, observer)
+        }
+        Chart::Calibration(calibration) => {
+            let ink = calibration.ink;
+            let dots = chart::calibration(ink, calibration.whole.paper, &NEXT)?;
+            calibration.whole.print("calibration", &dots, &[ink], false, observer)
+        }
+    }
+}
+
+/// What to do with what was measured on the calibration chart, printed on it.
+const NEXT: [&str; 2] = ["3. foilpress profile set default --cross X,Ymm \\", "       --distance Dmm"];
+
+fn artwork<'a>(name: &'a str, dots: &'a DotMap, allowed: InkSet, library: &'a Library) -> Artwork<'a> {
+    Artwork {
+        name,
+        dots,
+        allowed,
+        library,
+        notes: &[],
+        suggestions: Vec::new(),
+        report: Value::Null,
+        advice: String::new(),
+    }
+}
+
+/// The page. Charts are there to be photographed.
+fn layout(args: &JobArgs, observer: &dyn Observer) -> Result<Layout> {
+    Ok(Layout { camera_marks: true, ..args.layout.layout(observer)? })
+}
+
+fn print(artwork: &Artwork<'_>, layout: &Layout, args: &JobArgs, observer: &dyn Observer) -> Result<()> {
+    artwork.print(layout, &args.media, &args.result, &args.deliver, observer)
+}
+
+impl StepArgs {
+    fn run(
+        &self,
+        name: &'static str,
+        size: (usize, usize),
+        make: impl FnOnce(&Library) -> Result<DotMap, chart::ChartError>,
+        [first, second]: [&Stack; 2],
+        observer: &dyn Observer,
+    ) -> Result<()> {
+        let library = InkArgs::of(None, self.library.clone()).library()?;
+        let layout = layout(&self.job, observer)?;
+        chart::check_room(name, size, &layout)?;
+        let dots = make(&library)?;
+        let name = format!("{name} {first} {second}");
+        // Who names a foil wants it.
+        let artwork = artwork(&name, &dots, InkSet::ALL, &library);
+        print(&artwork, &layout, &self.job, observer).with_context(|| name.clone())
+    }
+}
+
+impl WholePage {
+    fn print(
+        &self,
+        name: &str,
+        dots: &DotMap,
+        inks: &[Ink],
+        camera_marks: bool,
+        observer: &dyn Observer,
+    ) -> Result<()> {
+        let library = Library::builtin();
+        let artwork = artwork(name, dots, InkSet::of(inks.iter().copied()), &library);
+        let layout = Layout { camera_marks, ..Layout::centred(self.paper) };
+        artwork.print(&layout, &self.media, &self.result, &self.deliver, observer)
+    }
+}

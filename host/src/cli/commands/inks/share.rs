@@ -1,0 +1,103 @@
+//! `foilpress inks add`, `list --added`, `remove`, `export` and `import`: libraries become the user's own, and go to others.
+
+use std::fs::File;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use inks::{Library, archive};
+
+use crate::cli::output::{Staged, file_name};
+use crate::libraries;
+
+/// The name that a folder or a file suggests.
+fn suggested(path: &Path, name: Option<String>) -> String {
+    let own = |path: &Path| {
+        let whole = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+        let part = if whole.is_dir() { whole.file_name() } else { whole.file_stem() };
+        part.map_or_else(String::new, |part| part.to_string_lossy().into_owned())
+    };
+    name.unwrap_or_else(|| own(path))
+}
+
+fn installed(name: &str, members: &[archive::Member], from: &Path) -> Result<String> {
+    let (folder, library) =
+        libraries::install(name, members).with_context(|| format!("{}", from.display()))?;
+    let licence = library.licence().map_or_else(String::new, |licence| format!(", licence {licence}"));
+    Ok(format!(
+        "{name}: {}{licence}\nin {}\nUse it with --library {name}; `foilpress inks remove {name}` removes it\n",
+        library.origins(),
+        folder.display()
+    ))
+}
+
+/// Makes the library in a folder one of the user's own.
+pub fn add(dir: &Path, name: Option<String>) -> Result<String> {
+    Library::from_dir(dir).with_context(|| format!("{} is not a usable ink library", dir.display()))?;
+    let members = archive::gather(dir).with_context(|| format!("{}", dir.display()))?;
+    installed(&suggested(dir, name), &members, dir)
+}
+
+/// Writes a library as one archive.
+pub fn export(spec: &Path, output: Option<&Path>, licence: Option<&str>) -> Result<String> {
+    if libraries::is_built_in(spec) {
+        bail!("the built-in library comes with every copy of the program, so there is nothing to export");
+    }
+    let folder = libraries::folder(spec)?;
+    let library = libraries::open(spec)?;
+    let output = output.map_or_else(
+        || PathBuf::from(format!("{}.zip", file_name(&suggested(&folder, None)))),
+        Path::to_path_buf,
+    );
+    let staged = Staged::file(&output)?;
+    let members = archive::gather(&folder).with_context(|| format!("{}", folder.display()))?;
+    let bytes =
+        archive::pack(&members, &library, licence).with_context(|| format!("{}", folder.display()))?;
+    std::fs::write(staged.path(), &bytes).with_context(|| format!("cannot write {}", output.display()))?;
+    staged.commit()?;
+    Ok(format!("{}: {}, {} bytes\n", output.display(), library.origins(), bytes.len()))
+}
+
+/// Makes the library in an archive one of the user's own.
+pub fn import(path: &Path, name: Option<String>) -> Result<String> {
+    let cannot = || format!("cannot read {}", path.display());
+    let mut bytes = Vec::new();
+    let file = File::open(path).with_context(cannot)?;
+    file.take(archive::MOST_ARCHIVE + 1).read_to_end(&mut bytes).with_context(cannot)?;
+    let members = archive::unpack(&bytes).with_context(|| format!("{}", path.display()))?;
+    installed(&suggested(path, name), &members, path)
+}
+
+/// The libraries that were added, a line each. One that cannot be used says so.
+pub fn list(json: bool) -> Result<String> {
+    let opened = |name: String| {
+        let library = libraries::added(&name)
+            .context("it was removed just now")
+            .and_then(|folder| libraries::open(&folder));
+        (name, library)
+    };
+    let all: Vec<(String, Result<Library>)> = libraries::names().into_iter().map(opened).collect();
+    if json {
+        let row = |(name, library): &(String, Result<Library>)| match library {
+            Ok(library) => {
+                serde_json::json!({ "name": name, "about": library.name(), "stacks": library.origins().to_string() })
+            }
+            Err(error) => serde_json::json!({ "name": name, "error": format!("{error:#}") }),
+        };
+        return Ok(serde_json::to_string_pretty(&all.iter().map(row).collect::<Vec<_>>())? + "\n");
+    }
+    if all.is_empty() {
+        return Ok("no library was added; `foilpress inks add DIR` adds one\n".into());
+    }
+    let line = |(name, library): &(String, Result<Library>)| match library {
+        Ok(library) => format!("{name:<16} {}\n", library.origins()),
+        Err(_) => format!("{name:<16} cannot be used; see `foilpress inks check {name}`\n"),
+    };
+    Ok(all.iter().map(line).collect())
+}
+
+/// Removes a library that was added.
+pub fn remove(name: &str) -> Result<String> {
+    let folder = libraries::remove(name)?;
+    Ok(format!("{name}: removed from {}\n", folder.display()))
+}

@@ -1,0 +1,399 @@
+//! `foilpress layers`: spot-colour art in, the job and everything to look at out.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args as ClapArgs;
+use inks::{InkSet, InkSetError, Library};
+use protocol::ink::Ink;
+use protocol::rgl::Resolution;
+use serde_json::json;
+
+use crate::cli::arguments::HalftoneArg;
+use crate::cli::arguments::choice::{choice, whole};
+use crate::cli::arguments::layout::{LayoutArgs, MediaArgs};
+use crate::cli::commands::preset::PresetArg;
+use crate::cli::console::advice;
+use crate::cli::console::usage;
+use crate::cli::printing::deliver::DeliverArgs;
+use crate::cli::printing::plan_output::PlanOutputArgs;
+use crate::cli::printing::{Artwork, ResultArgs};
+use art::{Accept, Composed, Finish, GAMMAS, Intent, MOST_CHOKE_MM, Order, Pages, Room, White, names};
+use observe::Observer;
+use pictures::resolution::RESOLUTIONS;
+use press::job::plan::{Suggestion, grouped};
+use press::layout::{self, Layout, Mm, NoLength};
+use press::pipeline;
+use sheet::DOTS_PER_MM;
+use sheet::Size;
+
+/// What to read and how it becomes layers of ink.
+#[derive(ClapArgs, Debug)]
+pub struct LayersArgs {
+    /// Artwork: pictures named after their inks (white.png, 02-gold.png), a folder of them, a TIFF with named spot
+    /// channels, an SVG with named layers, a PDF or PostScript file, or one picture
+    #[arg(value_name = "ART", required = true)]
+    pub art: Vec<PathBuf>,
+    /// Print the vendor's reserved colours in their inks: white 230,230,230, gold 225,160,0, silver 189,193,197,
+    /// metallic red 163,36,115, metallic blue 0,176,201, black 0,0,0
+    #[arg(long)]
+    pub reserved: bool,
+    /// Largest difference of red, green and blue from a reserved colour, 0 to 60 [default: 8 for white and black, 12
+    /// for metals]
+    #[arg(long, value_name = "STEPS", requires = "reserved", value_parser = whole(0..=60u8))]
+    pub tolerance: Option<u8>,
+    /// Resolution of the pictures in pixels per inch, if a file states none or a wrong one
+    #[arg(long, value_name = "DPI", value_parser = dpi)]
+    pub dpi: Option<f64>,
+    /// Page of a PDF, PostScript or TIFF file [default: the only page with art; several are an error]
+    #[arg(long, value_name = "N", value_parser = page)]
+    pub page: Option<u32>,
+    /// Read one page per ink from a PDF, PostScript or TIFF file: the ink of each page, such as white,gold,black
+    #[arg(long, value_name = "INKS", value_delimiter = ',', value_parser = names::typed, conflicts_with = "page")]
+    pub pages: Vec<Ink>,
+    /// Layers that keep their tones, and are halftoned; other layers are solid where they are darker than half
+    #[arg(long, value_name = "INKS")]
+    pub tones: Option<String>,
+    #[command(flatten)]
+    pub halftone: HalftoneArg,
+    /// Inks that may be used: names and the groups process, metallic, clear, foil, all, separated by commas; + and -
+    /// change the default [default: all but the foils]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub inks: Option<String>,
+    /// Order from the paper up: rules, given, or a list of inks such as white,black,white
+    /// [default: the numbers in the file names, else the ink library's rules]
+    ///
+    /// rules follows the ink library; given follows the order of the files or layers.
+    #[arg(long, value_name = "ORDER", value_parser = order)]
+    pub order: Option<Order>,
+    /// Number of passes of an ink, such as white=3,primer=2 [default: 1 each]
+    #[arg(long, value_name = "INK=N", value_delimiter = ',', value_parser = passes)]
+    pub passes: Vec<(Ink, u8)>,
+    /// Inks that knock out the process inks beneath them, or none [default: metallic]
+    #[arg(long, value_name = "INKS")]
+    pub knockout: Option<String>,
+    /// Where white is printed [default: where the artwork draws it]
+    #[arg(long, value_name = "MODE", value_parser = choice::<White>())]
+    pub white: Option<White>,
+    /// Shrink the white by this length, such as 0.1mm, so that it does not show beside the colours
+    #[arg(long, value_name = "LENGTH", value_parser = length, conflicts_with = "spread")]
+    pub choke: Option<f64>,
+    /// Spread the white by this length, such as 0.1mm
+    #[arg(long, value_name = "LENGTH", value_parser = length)]
+    pub spread: Option<f64>,
+    /// Where glossy finish is printed [default: where the artwork draws it]
+    #[arg(long, value_name = "WHERE", value_parser = choice::<Finish>())]
+    pub finish: Option<Finish>,
+    /// What is printed for colours that the inks do not reach
+    #[arg(long, value_name = "INTENT", value_parser = choice::<Intent>(), default_value = "auto")]
+    pub intent: Intent,
+    /// Brighten the colours of pictures by this exponent, 0.2 to 5; below 1 darkens them
+    #[arg(long, value_name = "EXPONENT", value_parser = gamma, default_value_t = 1.0)]
+    pub gamma: f64,
+    /// Suggestions of the plan to accept, separated by commas
+    #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = choice::<Accept>())]
+    pub accept: Vec<Accept>,
+    /// Your own ink library: its folder, or the name it was added under; its order rules and minimum clusters apply
+    /// [default: the built-in library]
+    #[arg(long, value_name = "LIBRARY")]
+    pub library: Option<PathBuf>,
+}
+
+fn dpi(text: &str) -> Result<f64, String> {
+    let dpi = text.parse().ok().filter(|dpi| RESOLUTIONS.contains(dpi));
+    let (least, most) = RESOLUTIONS.into_inner();
+    dpi.ok_or_else(|| format!("expected pixels per inch from {least} to {most}, such as 600"))
+}
+
+fn resolution(text: &str) -> Result<Resolution, String> {
+    match text {
+        "600" => Ok(Resolution::Dpi600),
+        "1200" => Ok(Resolution::Dpi1200),
+        _ => Err("expected 600 or 1200 dpi, as the printer prints; --dpi states the resolution of a picture"
+            .into()),
+    }
+}
+
+fn gamma(text: &str) -> Result<f64, String> {
+    let gamma = text.parse().ok().filter(|gamma| GAMMAS.contains(gamma));
+    gamma.ok_or_else(|| format!("expected a number from {} to {}, such as 1.2", GAMMAS.start(), GAMMAS.end()))
+}
+
+fn page(text: &str) -> Result<u32, String> {
+    match text.parse() {
+        Ok(page @ 1..) => Ok(page),
+        _ if text.ends_with(".html") => {
+            Err("expected the number of a page of the art; --html FILE writes the plan as a page".into())
+        }
+        _ => Err("expected the number of a page, such as 1".into()),
+    }
+}
+
+/// How far white may grow or shrink, in dots of 600 dpi.
+fn length(text: &str) -> Result<f64, String> {
+    let length: Mm = text.parse().map_err(|error: NoLength| error.to_string())?;
+    if (0.0..=MOST_CHOKE_MM).contains(&length.0) {
+        Ok(length.0 * DOTS_PER_MM)
+    } else {
+        Err(format!("expected a length from 0 to {MOST_CHOKE_MM} mm, such as 0.1mm"))
+    }
+}
+
+fn passes(text: &str) -> Result<(Ink, u8), String> {
+    let (ink, times) = text.split_once('=').ok_or("expected INK=N, such as white=3")?;
+    match times.trim().parse() {
+        Ok(times @ 1..=9) => Ok((names::typed(ink)?, times)),
+        _ => Err(format!("expected 1 to 9 passes, such as white=3, found `{times}`")),
+    }
+}
+
+fn order(text: &str) -> Result<Order, String> {
+    match text {
+        "rules" => Ok(Order::Rules),
+        "given" => Ok(Order::Given),
+        list => list.split(',').map(names::typed).collect::<Result<_, _>>().map(Order::Inks),
+    }
+}
+
+/// Inks as typed: any of their names, or groups.
+fn set(option: &str, text: &str) -> Result<InkSet> {
+    text.parse().map_err(|error: InkSetError| usage(format!("{option}: {error}")))
+}
+
+impl LayersArgs {
+    /// The library.
+    pub fn library(&self) -> Result<Library> {
+        crate::libraries::given(self.library.as_deref())
+    }
+
+    /// The inks that may be used: white is among the usual ones here.
+    pub fn inks(&self) -> Result<InkSet> {
+        let text = match self.inks.as_deref().map(str::trim) {
+            None => "default,white".into(),
+            Some(change) if change.starts_with(['+', '-']) => format!("default,white,{change}"),
+            Some(list) => list.to_owned(),
+        };
+        let inks = set("--inks", &text)?;
+        if inks.is_empty() {
+            return Err(usage("--inks leaves no ink to print with"));
+        }
+        Ok(inks)
+    }
+
+    /// How the art is read.
+    pub fn options(&self, size: Option<Size>, layout: &Layout) -> Result<art::Options> {
+        let (width, length) = layout.largest();
+        Ok(art::Options {
+            size,
+            dpi: self.dpi,
+            reserved: self.reserved || self.white == Some(White::Reserved),
+            tolerance: self.tolerance,
+            pages: match (self.page, &self.pages[..]) {
+                (Some(page), _) => Pages::Number(page),
+                (None, []) => Pages::Only,
+                (None, inks) => Pages::Inks(inks.to_vec()),
+            },
+            across: layout.resolution.across(1).into(),
+            tones: self.tones.as_deref().map_or(Ok(InkSet::EMPTY), |text| set("--tones", text))?,
+            inks: self.inks()?,
+            room: Room { width, length, cut: layout.cut },
+        })
+    }
+
+    /// How layers become stacks.
+    pub fn settings(&self) -> Result<art::Settings> {
+        Ok(art::Settings {
+            inks: self.inks()?,
+            order: self.order.clone().unwrap_or_default(),
+            passes: self.passes.clone(),
+            knockout: match self.knockout.as_deref() {
+                None => art::Settings::default().knockout,
+                Some("none") => InkSet::EMPTY,
+                Some(text) => set("--knockout", text)?,
+            },
+            white: self.white,
+            choke: self.choke.unwrap_or(0.0) - self.spread.unwrap_or(0.0),
+            finish: self.finish,
+            intent: self.intent,
+            gamma: self.gamma,
+            halftone: self.halftone.halftone,
+            accept: self.accept.clone(),
+        })
+    }
+
+    /// Notes on options that have no effect on this art.
+    fn idle(
+        &self,
+        art: &art::Artwork,
+        options: &art::Options,
+        settings: &art::Settings,
+        composed: &Composed,
+    ) -> Vec<String> {
+        let mut notes = Vec::new();
+        let mut lacks = |option: &str, value: &Option<String>, idle: bool| {
+            if let Some(value) = value.as_deref().filter(|_| idle) {
+                notes.push(format!("the art has no layer of {value}, so {option} has no effect"));
+            }
+        };
+        let tones = art.layers.iter().any(|layer| options.tones.contains(layer.ink));
+        lacks("--tones", &self.tones, !tones);
+        let laid = &composed.report.laid;
+        let knocks = laid.iter().any(|laid| settings.knockout.iter().any(|ink| ink.name() == laid.ink));
+        lacks("--knockout", &self.knockout, !knocks && !settings.knockout.is_empty());
+        if art.colour.is_none() {
+            let mut plain = |option: &str| {
+                notes.push(format!("the art has layers alone and no colours, so {option} has no effect"));
+            };
+            if settings.gamma != art::Settings::default().gamma {
+                plain("--gamma");
+            }
+            if settings.intent != art::Settings::default().intent {
+                plain("--intent");
+            }
+        }
+        notes
+    }
+}
+
+/// Art and everything that decides what comes of it on paper.
+#[derive(ClapArgs, Debug)]
+pub struct Work {
+    #[command(flatten)]
+    layers: LayersArgs,
+    /// Size on paper, such as 120x90mm, 12cm or 5x4in
+    ///
+    /// The artwork keeps its proportions. [default: the size stated in the files, else 600 dpi for layers and as large as the
+    /// page allows for a plain picture]
+    #[arg(long)]
+    size: Option<Size>,
+    /// Resolution of the print across the sheet: 600, or 1200 for art in cyan, magenta, yellow and black only
+    ///
+    /// Along the sheet it is always 600 dpi. The printer prints every other ink wrong at 1200 dpi, so such a job is refused.
+    #[arg(long, value_name = "DPI", default_value = "600", value_parser = resolution)]
+    resolution: Resolution,
+    #[command(flatten)]
+    layout: LayoutArgs,
+    #[command(flatten)]
+    media: MediaArgs,
+    #[command(flatten)]
+    preset: PresetArg,
+}
+
+/// Arguments of `layers`.
+#[derive(ClapArgs, Debug)]
+#[command(
+    args_override_self = true,
+    after_help = "Examples:\n  \
+    foilpress layers white.png gold.png black.png\n  \
+    foilpress layers decal/ --passes white=3 --finish artwork --mirror --media film\n  \
+    foilpress layers art.png --reserved --inks white,gold,black\n  \
+    foilpress layers art.svg --white silhouette --choke 0.1mm --repeat 2x4 --gap 3mm --crop-marks\n  \
+    foilpress layers decal.pdf --page 1 --white alpha\n  \
+    foilpress layers plates.pdf --pages white,gold,black    (one page per ink)\n  \
+    foilpress layers photo.png --size 120mm --to serial:/dev/ttyACM0\n  \
+    foilpress plan layers white.png gold.png black.png      (only the plan; nothing is written or sent)\n\n\
+    In a layer, dark pixels are ink; on a transparent background, everything drawn is ink. Artwork drawn at 600 dpi is \
+    printed dot for dot."
+)]
+pub struct Args {
+    #[command(flatten)]
+    work: Work,
+    #[command(flatten)]
+    result: ResultArgs,
+    #[command(flatten)]
+    deliver: DeliverArgs,
+}
+
+/// Arguments of `plan layers`.
+#[derive(ClapArgs, Debug)]
+#[command(
+    args_override_self = true,
+    after_help = "Examples:\n  \
+    foilpress plan layers white.png gold.png black.png --passes white=3\n  \
+    foilpress plan layers decal/ --repeat 3x4 --gap 2mm --html plan.html     (one page to keep beside the printer)\n  \
+    foilpress plan layers art.svg --json\n\n\
+    Takes the options of `foilpress layers` that decide what is printed, but not those that decide where it goes."
+)]
+pub struct PlanArgs {
+    #[command(flatten)]
+    work: Work,
+    #[command(flatten)]
+    output: PlanOutputArgs,
+}
+
+impl Work {
+    /// Reads the art, composes it, and hands what is to be printed and its layout to `then`.
+    fn with<T>(
+        &self,
+        observer: &dyn Observer,
+        then: impl FnOnce(&Artwork<'_>, &Layout) -> Result<T>,
+    ) -> Result<T> {
+        let library = self.layers.library()?;
+        let layout = Layout { resolution: self.resolution, ..self.layout.layout(observer)? };
+        let options = self.layers.options(self.size, &layout)?;
+        let settings = self.layers.settings()?;
+        let art = art::open(&self.layers.art, &options, observer)?;
+        // Before the long work.
+        layout::check(art.width / usize::from(self.resolution.across(1)), art.length, &layout)?;
+        let mut composed = art::compose(&art, &settings, &library, observer)?;
+        for note in self.layers.idle(&art, &options, &settings, &composed) {
+            observer.note(&note);
+            composed.report.notes.push(note);
+        }
+        let artwork = Artwork {
+            name: &art.name,
+            dots: &composed.dots,
+            allowed: settings.inks,
+            library: &library,
+            notes: &composed.report.notes,
+            suggestions: suggestions(&composed, &settings.inks),
+            report: json!({ "art": { "composed": composed.report } }),
+            advice: words(&composed),
+        };
+        then(&artwork, &layout)
+    }
+}
+
+/// Runs `layers`.
+pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
+    let Args { work, result, deliver } = args;
+    work.with(observer, |artwork, layout| artwork.print(layout, &work.media, result, deliver, observer))
+}
+
+/// Runs `plan layers`.
+pub fn plan(args: &PlanArgs, observer: &dyn Observer) -> Result<()> {
+    let page = args.output.stage()?;
+    args.work.with(observer, |artwork, layout| {
+        let mut draft = pipeline::draft(&artwork.request(layout, &args.work.media), observer)?;
+        draft.plan.notes = artwork.notes.to_vec();
+        draft.plan.suggestions.clone_from(&artwork.suggestions);
+        args.output.show(page, draft.into(), &artwork.report, &artwork.advice)
+    })
+}
+
+/// Suggestions with the options that follow them.
+fn suggestions(composed: &Composed, allowed: &InkSet) -> Vec<Suggestion> {
+    let suggestions = composed.suggestions.iter();
+    suggestions
+        .map(|art::Suggestion { text, remedy, dots }| Suggestion {
+            text: text.clone(),
+            how: advice::options_of(remedy, allowed),
+            dots: *dots,
+        })
+        .collect()
+}
+
+/// What was laid, in words.
+fn words(composed: &Composed) -> String {
+    let mut text = String::from("\nFrom the art, lowest first:\n");
+    for laid in &composed.report.laid {
+        let times = if laid.passes > 1 { format!(", {} times", laid.passes) } else { String::new() };
+        text.push_str(&format!(
+            "    {:<18} {:>13} dots  {}{times}\n",
+            laid.ink,
+            grouped(laid.dots),
+            laid.from
+        ));
+    }
+    text
+}

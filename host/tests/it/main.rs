@@ -1,0 +1,27 @@
+//! The program as its users run it, a module for each subject.
+
+#[cfg(unix)]
+mod art;
+mod bad_input;
+mod browser;
+mod cli;
+mod compare;
+mod display;
+mod edit;
+mod escapes;
+mod layers;
+mod libraries;
+#[cfg(unix)]
+mod limits;
+mod measure;
+#[cfg(unix)]
+mod missing;
+mod page;
+mod preview;
+mod report;
+mod scans;
+mod send;
+mod sources;
+mod text;
+mod threads;
+mod words;

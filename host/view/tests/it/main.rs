@@ -1,0 +1,4 @@
+//! Pictures and pages against others who make the same.
+
+mod browser;
+mod reference;

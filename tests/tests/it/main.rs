@@ -1,0 +1,15 @@
+//! Everything joined, a module for each scenario.
+
+mod bridge;
+mod corpora;
+mod documents;
+#[cfg(unix)]
+mod emulator;
+mod golden;
+mod link;
+mod pass_streams;
+#[cfg(unix)]
+mod queue;
+mod reference_renderer;
+#[cfg(unix)]
+mod shown;

