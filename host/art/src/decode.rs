@@ -35,21 +35,27 @@ pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Res
         matches!(format, Png | Jpeg | Tiff | Pnm | Bmp | Gif | WebP)
     });
     let Some(format) = format else {
-        let found = match guessed {
-            Some(format) => format!("{format:?}").to_uppercase() + ", which is not read",
-            None if bytes.is_empty() => "an empty file".into(),
+        let (found, way) = match guessed {
+            Some(format) => {
+                (format!("{format:?}").to_uppercase() + ", which is not read", Some("save it as PNG"))
+            }
+            None if bytes.is_empty() => ("an empty file".into(), None),
             // As drawings in `.svgz` are.
             None if bytes.starts_with(b"\x1f\x8b") => {
-                "a compressed one; unpack it, such as with gunzip".into()
+                ("a compressed one".into(), Some("unpack it, such as with gunzip"))
             }
-            None => "an unknown format".into(),
+            None => ("an unknown format".into(), None),
         };
-        return Err(wrong(
+        let diagnosis = wrong(
             path,
             format!(
                 "expected a PNG, TIFF, JPEG, PNM, BMP, GIF, WebP, SVG, PDF or PostScript file, found {found}"
             ),
-        ));
+        );
+        return Err(match way {
+            Some(way) => diagnosis.hint(way),
+            None => diagnosis,
+        });
     };
     if format == ImageFormat::Jpeg && jpeg_frame(&bytes).is_some_and(|(channels, ..)| channels == 4) {
         return Err(wrong(path, "the picture is CMYK, which is four layers instead of one")
