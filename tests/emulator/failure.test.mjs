@@ -59,7 +59,9 @@ const numbered = (all, text) => all.find(([, name]) => name.includes(`"data":"${
 
 /// Runs until the processor is about to execute something in a function.
 function reach(bench, all, name) {
-  const [address] = all.find(([, found]) => found.includes(name));
+  const found = all.find(([, symbol]) => symbol.includes(name));
+  assert.ok(found, `the image has no ${name}`);
+  const [address] = found;
   for (let i = 0; i < 50_000_000; i++) {
     bench.board.step();
     if (bench.board.chip.core.PC === (address & ~1)) return;
@@ -71,7 +73,7 @@ function reach(bench, all, name) {
 function reachLog(bench, all) {
   // The printer goes, which is logged.
   bench.printer.later(0, () => bench.printer.change({ paperOut: 1 }));
-  reach(bench, all, '4keep3log');
+  reach(bench, all, '8retained3log');
   bench.printer.own.paperOut = 0;
 }
 
