@@ -103,3 +103,51 @@ pub fn of_tiff(decoder: &mut TiffDecoder<'_>) -> Option<Dpi> {
     };
     Some((along(Tag::XResolution)?, along(Tag::YResolution)?))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn dpi_of(bytes: &[u8]) -> Option<Dpi> {
+        of_file(bytes, image::guess_format(bytes).ok()?)
+    }
+
+    #[test]
+    fn each_format_states_it_in_its_own_way() {
+        let mut png = Vec::new();
+        let mut encoder = png::Encoder::new(&mut png, 1, 1);
+        encoder.set_pixel_dims(Some(png::PixelDimensions {
+            xppu: 23_622,
+            yppu: 23_622,
+            unit: png::Unit::Meter,
+        }));
+        encoder.write_header().unwrap().write_image_data(&[0]).unwrap();
+        let found = dpi_of(&png).unwrap();
+        assert!((found.0 - 600.0).abs() < 0.02 && found.0 == found.1, "{found:?}");
+        let jpeg = [&[0xff, 0xd8, 0xff, 0xe0, 0, 16][..], b"JFIF\0", &[1, 1, 1, 1, 44, 2, 88, 0, 0]].concat();
+        assert_eq!(dpi_of(&jpeg), Some((300.0, 600.0)));
+        let mut tiff = Cursor::new(Vec::new());
+        let mut encoder = ::tiff::encoder::TiffEncoder::new(&mut tiff).unwrap();
+        let mut picture = encoder.new_image::<::tiff::encoder::colortype::Gray8>(1, 1).unwrap();
+        let fraction = |n| ::tiff::encoder::Rational { n, d: 10 };
+        picture.x_resolution(fraction(2362));
+        picture.y_resolution(fraction(1181));
+        picture.resolution_unit(::tiff::tags::ResolutionUnit::Centimeter);
+        picture.write_data(&[0]).unwrap();
+        let found = dpi_of(tiff.get_ref()).unwrap();
+        assert!((found.0 - 599.95).abs() < 0.01 && (found.1 - 299.97).abs() < 0.01, "{found:?}");
+    }
+
+    #[test]
+    fn what_is_damaged_or_silent_states_nothing() {
+        for bytes in [
+            &b""[..],
+            b"\x89PNG\r\n\x1a\n\xff\xff\xff\xffabcd",
+            b"\x89PNG\r\n\x1a\n\0\0\0\x09pHYs\0",
+            &[0xff, 0xd8, 0xff, 0xe0, 0, 16, b'J'],
+            b"II*\0\xff\xff\xff\xff",
+        ] {
+            assert_eq!(dpi_of(bytes), None, "{bytes:?}");
+        }
+    }
+}

@@ -433,7 +433,8 @@ fn quoted_messages_are_those_of_the_program() {
             let Some(cell) = line.split('|').nth(1).filter(|_| is_table) else { continue };
             let quotes = cell.split(['`', '"']).skip(1).step_by(2).filter(|quote| !quote.starts_with("--"));
             for part in quotes.flat_map(|quote| quote.split(|c: char| c == '…' || c.is_ascii_digit())) {
-                let part = part.trim_matches([' ', ',', '.', ':']);
+                // Hints follow behind a semicolon.
+                let part = part.trim_matches([' ', ',', '.', ':', ';', ')']);
                 if part.chars().count() >= 8 && !part.starts_with("foilpress") {
                     quoted += 1;
                     if !messages.contains(part) {

@@ -201,10 +201,11 @@ impl<'a> Work<'a> {
             self.bases.push(row);
             self.origin.push(self.origin[basis]);
             self.maps.push(parts);
-        } else {
-            return Ok(());
         }
-        self.effects.push(Effect { step: self.step, basis, into, share, applied });
+        // What no pixel has has its new curve for the steps behind, but nothing that is seen has changed.
+        if share > 0.0 {
+            self.effects.push(Effect { step: self.step, basis, into, share, applied });
+        }
         Ok(())
     }
 
