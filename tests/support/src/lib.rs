@@ -23,6 +23,15 @@ pub fn cases(of_64: u32) -> Config {
     }
 }
 
+/// As many of these as a change should wait for, drawn from what the property tests are drawn from; all of them where
+/// [everything is tried](is_full).
+pub fn drawn<T>(of: &[T], count: usize) -> impl Iterator<Item = &T> {
+    let seed = std::env::var("PROPTEST_RNG_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(0u64);
+    let count = if is_full() { of.len() } else { count.min(of.len()) };
+    let first = seed.checked_rem(of.len() as u64).unwrap_or(0) as usize;
+    of.iter().cycle().skip(first).take(count)
+}
+
 /// Whether everything is tried as it stands, not only as much as a change should wait for: `cargo xtask test --full`.
 pub fn is_full() -> bool {
     std::env::var_os("FOILPRESS_FULL").is_some_and(|value| !value.is_empty())

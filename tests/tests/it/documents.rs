@@ -27,12 +27,13 @@ struct Print {
 fn print(spec: &str, intent: Intent, inks: InkSet) -> Print {
     let document =
         document::open(spec, &Options::default(), &Silent).unwrap_or_else(|e| panic!("{spec}: {e}"));
+    let side = if testing::is_full() { 80.0 } else { 40.0 };
     let settings = Settings {
         factor: factor::FactorSettings { bases: Some(4), ..Default::default() },
         gamut: gamut::GamutSettings { intent, ..Default::default() },
         inks,
         halftone: Default::default(),
-        size: Some(Size { width: 80.0, height: Some(80.0) }),
+        size: Some(Size { width: side, height: Some(side) }),
     };
     let (layout, library) = (Layout::centred(Paper::Postcard), Library::builtin());
     let halftoned =

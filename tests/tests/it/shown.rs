@@ -1,7 +1,8 @@
 //! Commands that the README, the guides and the help show, run on small documents, or as they stand where
 //! [everything is tried](testing::is_full).
 //!
-//! Small is a third of every length on paper and of every picture's side; each word of a command is there, in its order.
+//! Small is a third of every length on paper and of every picture's side, and 300 pixels for a preview; each word of a
+//! command is there, in its order.
 //! A document's commands run in order, in a copy of the folders that it speaks of, so that later lines find what earlier
 //! ones made. What goes to a bridge goes to one that this test serves: only the address is another. [`ELSEWHERE`] names the
 //! commands that need more than that, and who runs them.
@@ -194,6 +195,9 @@ impl Desk {
                 if command.contains(of) {
                     command = scaled(&command, option);
                 }
+            }
+            if command.starts_with("foilpress preview ") && !command.contains("--pixels") {
+                command.push_str(" --pixels 300");
             }
         }
         if let Some(rest) = command.strip_prefix("cargo run --release -- ") {

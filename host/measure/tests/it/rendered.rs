@@ -108,9 +108,9 @@ fn report(name: &str, taken: &Taken, score: &Score) {
 }
 
 #[test]
-fn seven_materials_with_known_geometry() {
+fn materials_with_known_geometry() {
     let Some(script) = renderer() else { return };
-    for material in &MATERIALS {
+    for material in testing::drawn(&MATERIALS, 3) {
         let rendered = Rendered::new(&script, material, "");
         let taken =
             measure(&rendered.photos(), &setup(&EXACT, material.stack, &rendered.times), None, &Silent)
@@ -136,7 +136,7 @@ fn a_wrong_tape_is_corrected() {
         ("leaning 0.5 degrees", Tape { axis: [lean.sin(), lean.cos(), 0.0], ..solved }),
         ("nodding 0.5 degrees", Tape { axis: [0.0, lean.cos(), lean.sin()], ..solved }),
     ];
-    for material in &MATERIALS {
+    for material in testing::drawn(&MATERIALS, 2) {
         let rendered = Rendered::new(&script, material, "");
         for (name, tape) in &cases {
             let taken =
