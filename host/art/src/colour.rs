@@ -11,6 +11,7 @@
 //! in such an average: they are fixed. Limits: the accuracy of colours is that of the ink library.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use inks::{InkSet, Library, Stack};
 use protocol::ink::Ink;
@@ -20,18 +21,22 @@ use super::averages::{averaged, joined};
 use super::bitplane;
 use super::compose::Settings;
 use super::error::{not_halftoned, unfitted};
+use super::fine;
 use super::flat::{BLACK, Flat, INKED, TONE, is_tone, split};
 use super::intent::Intent;
 use super::lattice::{Lattice, Nodes, ends, step, with_tints};
 use super::looks::Looks;
 use super::outline;
+use super::pixels::Pixels;
 use super::solids::Solids;
 use super::treatments::treatments;
 use appearance::brdf::Space;
 use appearance::document::SAMPLES;
 use appearance::gamut::{self, InkMix, Printable};
+use appearance::srgb;
 use appearance::weights::{ONE, WeightMaps};
-use halftone::halftone;
+use halftone::green_noise::Table;
+use halftone::{Method, halftone};
 use observe::{Diagnosis, Observer};
 use sheet::{Plane, pack};
 
@@ -53,6 +58,8 @@ pub struct Colour {
     pub(super) flat: Flat,
     /// The black dots, if all others are white; then there is nothing else.
     pub(super) black: Option<Plane>,
+    /// The colours as they are read; then there is nothing else.
+    pub(super) pixels: Option<Pixels>,
 }
 
 impl Colour {
@@ -84,9 +91,30 @@ impl Colour {
         Some(Colour { flat: flat.at_dots(size, dots), ..colour })
     }
 
-    /// Whether there are no tones: every dot is in a flat colour.
-    pub(super) fn is_line_art(&self) -> bool {
-        self.black.is_some() || !self.flat.index.is_empty() && !self.flat.has_tones()
+    /// The colours of pixels of `N` bytes ([`Colour::of`]), kept as they are; `None` if all are white.
+    pub(super) fn of_pixels<const N: usize>(bytes: Vec<u8>, size: (u32, u32)) -> Option<Colour> {
+        let is_white = |pixels: &[[u8; N]]| {
+            pixels.iter().fold(255, |all, pixel| all & split(pixel).1.iter().fold(255, |a, v| a & v)) == 255
+        };
+        let white = bytes.as_chunks::<N>().0.par_chunks(1 << 12).all(is_white);
+        let pixels = Pixels { bytes, each: N, width: size.0 as usize, height: size.1 as usize };
+        (!white).then(|| Colour { pixels: Some(pixels), ..Colour::default() })
+    }
+
+    /// The colours of these pixels as tones and flat colours.
+    pub(super) fn read(&self, dots: (usize, usize)) -> Cow<'_, Colour> {
+        let Some(Pixels { bytes, each, width, height }) = &self.pixels else { return Cow::Borrowed(self) };
+        let size = (*width as u32, *height as u32);
+        let read = match each {
+            4 => Colour::of::<4>(bytes.as_chunks().0, size, dots),
+            _ => Colour::of::<3>(bytes.as_chunks().0, size, dots),
+        };
+        Cow::Owned(Colour { overprints: self.overprints, ..read.unwrap_or_default() })
+    }
+
+    /// Whether no dot has a colour: all that was drawn is finer than a dot.
+    fn is_empty(&self) -> bool {
+        self.pixels.is_none() && self.black.is_none() && self.rgb.is_empty() && self.flat.index.is_empty()
     }
 
     /// Flat colours alone; `None` if all are white.
@@ -135,11 +163,19 @@ impl Colour {
         library: &Library,
         observer: &dyn Observer,
     ) -> Result<Vec<(Ink, Plane)>, Diagnosis> {
-        if let Some(black) = &self.black {
+        let is_fine = settings.halftone == Method::Fine;
+        let colour = if is_fine { Cow::Borrowed(self) } else { self.read(dots) };
+        if colour.is_empty() {
+            return Ok(Vec::new());
+        }
+        if let Some(black) = &colour.black {
             let inks = black_inks(inks, library);
             return Ok(inks.into_iter().map(|ink| (ink, black.clone())).collect());
         }
-        let (stacks, index) = self.halftone(dots, inks, settings, library, observer)?;
+        let (stacks, index) = match is_fine {
+            true => colour.fine(dots, inks, settings, library, observer)?,
+            false => colour.halftone(dots, inks, settings, library, observer)?,
+        };
         let mut inks_of = [0u16; 256];
         for (inks_of, stack) in inks_of.iter_mut().zip(&stacks) {
             let has = inks.iter().enumerate().filter(|(_, ink)| stack.layers().contains(ink));
@@ -147,6 +183,35 @@ impl Colour {
         }
         let planes = pack::pack(dots.0, &index, &inks_of, inks.len());
         Ok(inks.iter().zip(planes).collect())
+    }
+
+    /// Picks the stack of each dot by a table: stacks of process inks, and the stack of each dot.
+    fn fine(
+        &self,
+        dots: (usize, usize),
+        inks: &InkSet,
+        settings: &Settings,
+        library: &Library,
+        observer: &dyn Observer,
+    ) -> Result<(Vec<Stack>, Vec<u8>), Diagnosis> {
+        let space = Space::half_angle(SAMPLES);
+        let printable = Printable::from_library(library, inks, &space);
+        let solids = Solids::new(&printable, &space);
+        let fit = self.fit((&printable, &solids), space, settings, observer)?;
+        let minimum = fit.stacks.iter().map(|stack| library.minimum_cluster(stack)).max();
+        let table = Table::for_cluster(minimum.unwrap_or_default());
+        let index = match &self.pixels {
+            Some(pixels) => fine::dots(pixels.rows(dots), dots, &fit, &solids, table),
+            None => {
+                let keys = self.flat.keys();
+                let rows = |rows: Range<usize>, out: &mut [fine::Key]| {
+                    let dots = &self.flat.index[rows.start * dots.0..rows.end * dots.0];
+                    out.iter_mut().zip(dots).for_each(|(out, &dot)| *out = keys[usize::from(dot)]);
+                };
+                fine::dots(rows, dots, &fit, &solids, table)
+            }
+        };
+        Ok((fit.stacks, index))
     }
 
     /// Halftones the colours: stacks of process inks, and the stack of each dot.
@@ -194,7 +259,7 @@ impl Colour {
         settings: &Settings,
         observer: &dyn Observer,
     ) -> Result<Fit, Diagnosis> {
-        let has_drawings = self.flat.colours.len() > 2 || !self.drawn.is_empty();
+        let has_drawings = self.pixels.is_some() || self.flat.colours.len() > 2 || !self.drawn.is_empty();
         let intents: &[Intent] = match settings.intent {
             Intent::Auto if has_drawings => &[Intent::Perceptual, Intent::Colorimetric],
             Intent::Auto => &[Intent::Perceptual],
@@ -212,7 +277,12 @@ impl Colour {
         let of_drawings = intents.len() - 1;
         if of_drawings > 0 {
             let named = |colour| solids.named(colour);
-            mix = with_tints(mix, of_drawings, settings.gamma, named).map_err(unfitted)?;
+            let amount = |level: f64| {
+                let value = level.powf(1.0 / settings.gamma);
+                // Dots add light.
+                if settings.halftone == Method::Fine { srgb::decode(value as f32).into() } else { value }
+            };
+            mix = with_tints(mix, of_drawings, amount, named).map_err(unfitted)?;
         }
         let InkMix { stacks, maps, matrix } = mix;
         let channels = maps.channels();
@@ -285,9 +355,9 @@ pub(super) struct Fit {
     channels: usize,
     nodes: Nodes,
     /// Places of the 256 values between nodes.
-    steps: [(usize, u32); 256],
+    pub steps: [(usize, u32); 256],
     /// Number of the lattice for text and drawings.
-    of_drawings: usize,
+    pub of_drawings: usize,
 }
 
 impl Fit {
@@ -299,6 +369,17 @@ impl Fit {
             self.matrix.iter_mut().for_each(|shares| shares.push(0));
             self.stacks.len() - 1
         }) as u8
+    }
+
+    /// The share of every stack at each node.
+    pub fn shares(&self) -> impl Iterator<Item = Vec<u64>> {
+        self.nodes.weights().map(|weights| {
+            let share = |stack: usize| {
+                let parts = weights.iter().zip(&self.matrix);
+                parts.map(|(&weight, shares)| u64::from(weight) * u64::from(shares[stack])).sum()
+            };
+            (0..self.stacks.len()).map(share).collect()
+        })
     }
 
     /// The weights of the stacks in a flat colour.
@@ -479,14 +560,14 @@ mod tests {
 
     #[test]
     fn a_tint_of_an_ink_is_that_ink_alone() {
-        // As CMYK arrives: 30 % cyan, 80 % magenta, 50 % yellow, 40 % of magenta and yellow, and 50 % yellow on magenta.
+        // The value between black and paper decides: of it, or of its light, is the ground, and the rest is the ink.
         let tints = [
-            ([179, 255, 255], "C", "substrate", 0.3),
-            ([255, 51, 255], "M", "substrate", 0.8),
-            ([255, 255, 127], "Y", "substrate", 0.5),
-            ([255, 153, 153], "M+Y", "substrate", 0.4),
-            ([255, 0, 127], "M+Y", "M", 0.5),
-            ([0, 204, 255], "C+M", "C", 0.2),
+            ([179, 255, 255], "C", "substrate", 179),
+            ([255, 51, 255], "M", "substrate", 51),
+            ([255, 255, 127], "Y", "substrate", 127),
+            ([255, 153, 153], "M+Y", "substrate", 153),
+            ([255, 0, 127], "M+Y", "M", 127),
+            ([0, 204, 255], "C+M", "C", 204),
         ];
         let pixels: Vec<[u8; 4]> =
             tints.iter().flat_map(|&([r, g, b], ..)| [[ObjectType::DRAWING, r, g, b]; 4]).collect();
@@ -494,12 +575,18 @@ mod tests {
         let space = Space::half_angle(SAMPLES);
         let printable = Printable::from_library(&Library::builtin(), &process(), &space);
         let solids = Solids::new(&printable, &space);
-        let fit = colour.fit((&printable, &solids), space, &Settings::default(), &Silent).unwrap();
-        for (rgb, name, ground, share) in tints {
-            let weights = fit.weights(rgb);
-            let of = |name: &str| weights[fit.stacks.iter().position(|s| s.to_string() == name).unwrap()];
-            assert!((of(name) - share).abs() < 0.005, "{name}: {} of {share}", of(name));
-            assert!((of(name) + of(ground) - 1.0).abs() < 0.002, "{name}: {weights:?}");
+        for halftone in [Method::Cells, Method::Fine] {
+            let settings = Settings { halftone, ..Settings::default() };
+            let fit = colour.fit((&printable, &solids), space.clone(), &settings, &Silent).unwrap();
+            for (rgb, name, ground, value) in tints {
+                let value = value as f32 / 255.0;
+                let share =
+                    1.0 - f64::from(if halftone == Method::Fine { srgb::decode(value) } else { value });
+                let weights = fit.weights(rgb);
+                let of = |name: &str| weights[fit.stacks.iter().position(|s| s.to_string() == name).unwrap()];
+                assert!((of(name) - share).abs() < 0.005, "{name}: {} of {share}", of(name));
+                assert!((of(name) + of(ground) - 1.0).abs() < 0.002, "{name}: {weights:?}");
+            }
         }
     }
 

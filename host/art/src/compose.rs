@@ -28,7 +28,7 @@ use super::size::MM;
 use super::white::White;
 use appearance::gamut::InkMix;
 use appearance::weights::{ONE, WeightMaps};
-use halftone::halftone;
+use halftone::{Method, halftone};
 use observe::{Diagnosis, Observer};
 use sheet::DotMap;
 use sheet::order::customary;
@@ -191,10 +191,12 @@ fn tone(
     let stacks = vec![Stack::SUBSTRATE, Stack::new([ink])];
     let mix = InkMix { stacks, maps, matrix: vec![vec![ONE, 0], vec![0, ONE]] };
     let (width, height) = (art.width as u16, art.length as u16);
-    let toning = halftone::Settings {
-        method: settings.halftone,
-        ..halftone::Settings::from_library(&mix.stacks, library)
+    let method = match settings.halftone {
+        // Foils and metals need cells of their own.
+        Method::Fine if ink.kind() != Kind::Process => Method::Cells,
+        method => method,
     };
+    let toning = halftone::Settings { method, ..halftone::Settings::from_library(&mix.stacks, library) };
     // What the plate has wholly or not at all is no tone.
     let fixed = coverage.par_iter().map(|&c| match c {
         0 => 0,

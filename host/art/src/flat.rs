@@ -12,6 +12,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use super::fine::{Key, key};
 use super::kinds::{K_OF_PICTURES, ObjectType};
 use super::masks::Masks;
 use super::palette::{palette, sort};
@@ -240,6 +241,12 @@ impl Flat {
             touching
         });
         rows.reduce(Touching::none, Touching::joined)
+    }
+
+    /// The colours in the form in which dots ask for them, by their numbers.
+    pub(super) fn keys(&self) -> [Key; 256] {
+        let key_of = |&(kind, colour): &Drawn| key(colour, kind != ObjectType::Picture);
+        std::array::from_fn(|number| self.colours.get(number).map_or(Key::MAX, key_of))
     }
 
     pub(super) fn has_tones(&self) -> bool {

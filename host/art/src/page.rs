@@ -244,10 +244,13 @@ mod tests {
             // What nothing is drawn on has no colour.
             if whole.drawn.dots() > 0 {
                 let dots = (whole.width, whole.length);
-                let averaged = |colour: Colour| Colour {
-                    flat: colour.flat.clone(),
-                    black: colour.black.clone(),
-                    ..colour.averages(dots, None).into_owned()
+                let averaged = |colour: Colour| {
+                    let colour = colour.read(dots).into_owned();
+                    Colour {
+                        flat: colour.flat.clone(),
+                        black: colour.black.clone(),
+                        ..colour.averages(dots, None).into_owned()
+                    }
                 };
                 prop_assert_eq!(found.colour.map(averaged), whole.colour.map(averaged));
             }

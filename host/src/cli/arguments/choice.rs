@@ -140,6 +140,11 @@ impl Choice for halftone::Method {
         (halftone::Method::Cells, "cells", "Compact clusters, no part thinner than its ink holds"),
         (halftone::Method::Best, "best", "Cells, rearranged to lessen the error the eye sees; slower"),
         (halftone::Method::Blue, "blue", "Single scattered dots (blue noise); for process inks alone"),
+        (
+            halftone::Method::Fine,
+            "fine",
+            "Small clusters that each dot picks from a table; for process inks alone",
+        ),
     ];
 }
 
