@@ -231,3 +231,11 @@ pub(super) fn no_sheet(source: SheetError) -> Diagnosis {
 pub(super) fn resolution_in_words((x, y): (f64, f64)) -> String {
     if (x - y).abs() < 0.5 { format!("{x:.0} dpi") } else { format!("{x:.0} x {y:.0} dpi") }
 }
+/// An error about a page that has art, of which the ink that is named for it gets nothing.
+pub(super) fn no_dot(path: &Path, page: &str, ink: Ink) -> Diagnosis {
+    let problem = format!(
+        "{page} has art, but {} gets no dot of it: nothing on it is dark enough to be ink",
+        ink.name()
+    );
+    wrong(path, problem).hint("draw it in black, or in one colour on nothing")
+}

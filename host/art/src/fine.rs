@@ -10,7 +10,6 @@
 //! Limits: process inks, and colours of 8 bits.
 //! Source: `green_noise` of the halftone for the table; three examinations by a model of the eye for the rest (docs/decisions/flat-art.md).
 
-mod edges;
 #[cfg(test)]
 mod figures;
 mod lean;
@@ -22,12 +21,12 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::colour::Fit;
+use super::fit::Fit;
+use super::key::{DRAWN, Key, LABEL, colour};
 use super::solids::Solids;
 use appearance::wide::wide;
-pub(super) use edges::Edges;
 use halftone::green_noise::{SIDE, Table};
-use lean::Leans;
+use lean::{FLAT, Leans};
 use mixtures::{Mixtures, Stops};
 
 /// Rows of a strip.
@@ -37,27 +36,6 @@ const STRIP: usize = 64;
 const HALO: usize = 4;
 /// Neighbours of its very colour that make a dot flat: a line of one dot has two.
 const ALIKE: u8 = 2;
-
-/// The colour of a dot: red, green and blue from the top of the lowest 24 bits, and [`DRAWN`].
-pub(super) type Key = u32;
-
-/// Text or a drawing has the colour.
-pub(super) const DRAWN: Key = 1 << 24;
-/// A flat dot has the colour.
-const FLAT: Key = 1 << 25;
-
-/// The key of a colour. White is white, whatever drew it.
-#[inline]
-pub(super) fn key([r, g, b]: [u8; 3], drawn: bool) -> Key {
-    let rgb = u32::from_be_bytes([0, r, g, b]);
-    if drawn && rgb != 0xff_ff_ff { rgb | DRAWN } else { rgb }
-}
-
-#[inline]
-pub(super) fn colour(key: Key) -> [u8; 3] {
-    let [_, r, g, b] = key.to_be_bytes();
-    [r, g, b]
-}
 
 /// The number of the stack of every dot. `rows` writes the colours of rows of dots.
 pub(super) fn dots(
@@ -78,7 +56,7 @@ fn strips<const N: usize>(
     rows: &(impl Fn(Range<usize>, &mut [Key]) + Sync),
     (width, height): (usize, usize),
     strip: usize,
-    mixtures: &Mixtures<N>,
+    mixtures: &Mixtures<'_, N>,
     table: &Table,
 ) -> Vec<u8> {
     let mut index = vec![0; width * height];
@@ -129,7 +107,7 @@ impl Strip {
     }
 
     #[inline(always)]
-    fn pick<const N: usize>(&self, mixtures: &Mixtures<N>, table: &Table, out: &mut [u8]) {
+    fn pick<const N: usize>(&self, mixtures: &Mixtures<'_, N>, table: &Table, out: &mut [u8]) {
         let mut leans = Leans::new(&self.keys, self.width);
         let mut known = Known::new(mixtures);
         for (y, out) in self.own.clone().zip(out.chunks_exact_mut(self.width)) {
@@ -175,7 +153,7 @@ fn mark_flat(out: &mut [Key], around: [Option<&[Key]>; 3]) {
 
 /// The stops of the colours that were asked for last.
 struct Known<'a, const N: usize> {
-    mixtures: &'a Mixtures<N>,
+    mixtures: &'a Mixtures<'a, N>,
     /// By a hash of the colour.
     last: Vec<(Key, Stops<N>)>,
     leaning: std::collections::HashMap<(Key, Key, bool), Stops<N>>,
@@ -185,7 +163,7 @@ struct Known<'a, const N: usize> {
 const KEPT: usize = 1 << 10;
 
 impl<'a, const N: usize> Known<'a, N> {
-    fn new(mixtures: &'a Mixtures<N>) -> Known<'a, N> {
+    fn new(mixtures: &'a Mixtures<'a, N>) -> Known<'a, N> {
         Known { mixtures, last: vec![(Key::MAX, [0; N]); KEPT], leaning: Default::default() }
     }
 
@@ -194,8 +172,9 @@ impl<'a, const N: usize> Known<'a, N> {
         let known = &mut self.last[(key.wrapping_mul(0x9e37_79b1) >> 22) as usize % KEPT];
         if known.0 != key {
             let drawn = key & DRAWN > 0;
-            let stops = match key & FLAT {
-                0 => self.mixtures.stops(colour(key), drawn),
+            let stops = match (key & LABEL, key & FLAT) {
+                (LABEL, _) => self.mixtures.label(colour(key)),
+                (_, 0) => self.mixtures.stops(colour(key), drawn),
                 _ => self.mixtures.flat(colour(key), drawn),
             };
             *known = (key, stops);

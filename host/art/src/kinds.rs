@@ -18,9 +18,6 @@ pub const DEVICE: &str = "bitrgbtags";
 /// Bytes of a pixel: its tag, red, green and blue.
 pub const BYTES: usize = 4;
 
-/// What Ghostscript makes of full K and nothing else in a picture, whose colours it converts with a profile.
-pub(super) const K_OF_PICTURES: [u8; 3] = [35, 31, 32];
-
 /// What drew a pixel.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub enum ObjectType {
@@ -50,6 +47,13 @@ impl ObjectType {
             _ => ObjectType::Picture,
         }
     }
+}
+
+/// What drew a pixel of three bytes, or of four with a tag before them, and its colour.
+#[inline(always)]
+pub(super) fn split<const N: usize>(pixel: &[u8; N]) -> (ObjectType, [u8; 3]) {
+    let kind = if N == BYTES { ObjectType::of(pixel[0]) } else { ObjectType::Picture };
+    (kind, [pixel[N - 3], pixel[N - 2], pixel[N - 1]])
 }
 
 /// Where Ghostscript writes the tag of a pixel. What is read here always has it first.

@@ -12,6 +12,7 @@ use inks::Stack;
 use protocol::ink::Ink;
 use rayon::prelude::*;
 
+use super::even::Even;
 use super::intent::{Hull, Intent, Light};
 use appearance::brdf::Space;
 use appearance::document::Materials;
@@ -152,53 +153,77 @@ pub(super) fn with_tints(
     amount: impl Fn(f64) -> f64,
     named: impl Fn([u8; 3]) -> Option<Stack>,
 ) -> Result<InkMix, WeightError> {
-    let InkMix { mut stacks, maps, mut matrix } = mix;
-    let old = maps.channels();
-    // The channel that is nothing but a stack.
-    let mut channel = |stack: &Stack| {
-        let number = stacks.iter().position(|known| known == stack).unwrap_or_else(|| {
-            stacks.push(stack.clone());
-            matrix.iter_mut().for_each(|shares| shares.push(0));
-            stacks.len() - 1
-        });
-        matrix.iter().position(|shares| shares[number] == ONE).unwrap_or_else(|| {
-            let mut shares = vec![0; stacks.len()];
-            shares[number] = ONE;
-            matrix.push(shares);
-            matrix.len() - 1
-        })
-    };
+    let mut wider = Wider::new(mix);
     // The corners without black: red, green and blue are a bit each.
     let corners: [Option<usize>; 8] = std::array::from_fn(|bits| {
         let colour = [4, 2, 1].map(|bit| if bits & bit > 0 { 255 } else { 0 });
-        (bits > 0).then(|| named(colour)).flatten().map(|stack| channel(&stack))
+        (bits > 0).then(|| named(colour)).flatten().map(|stack| wider.channel(&stack))
     });
-    let channels = matrix.len();
-    let mut data = vec![0; maps.data().len() / old * channels];
-    for (out, weights) in data.chunks_exact_mut(channels).zip(maps.data().chunks_exact(old)) {
-        out[..old].copy_from_slice(weights);
-    }
-    for node in 0..ALL {
-        let Some(Tint { parts, part }) =
-            Tint::of([node / (NODES * NODES), node / NODES % NODES, node % NODES], &amount)
-        else {
-            continue;
-        };
+    wider.changed(|node, out| {
+        let Some(node) = node.checked_sub(lattice * ALL).filter(|&node| node < ALL) else { return };
+        let at = [node / (NODES * NODES), node / NODES % NODES, node % NODES];
+        let Some(Tint { parts, part }) = Tint::of(at, &amount) else { return };
         let parts = parts.map(|(corner, share)| (corners[corner], share));
         if part == 0.0 || parts.iter().any(|&(corner, share)| corner.is_none() && share > 0.0) {
-            continue;
+            return;
         }
-        let out = &mut data[(lattice * ALL + node) * channels..][..channels];
-        let mut mixed: Vec<f64> = out.iter().map(|&weight| (1.0 - part) * f64::from(weight)).collect();
+        out.iter_mut().for_each(|weight| *weight *= 1.0 - part);
         for (corner, share) in parts {
             if let Some(corner) = corner {
-                mixed[corner] += part * share * f64::from(ONE);
+                out[corner] += part * share;
             }
         }
-        quantise(&mixed, out);
+    })
+}
+
+/// Mixtures with further channels, each of which is nothing but a stack.
+struct Wider {
+    stacks: Vec<Stack>,
+    maps: WeightMaps,
+    matrix: Vec<Vec<u16>>,
+}
+
+impl Wider {
+    fn new(InkMix { stacks, maps, matrix }: InkMix) -> Wider {
+        Wider { stacks, maps, matrix }
     }
-    let maps = WeightMaps::new(maps.width(), maps.height(), channels, data)?;
-    Ok(InkMix { stacks, maps, matrix })
+
+    /// The channel that is nothing but a stack.
+    fn channel(&mut self, stack: &Stack) -> usize {
+        let number = self.stacks.iter().position(|known| known == stack).unwrap_or_else(|| {
+            self.stacks.push(stack.clone());
+            self.matrix.iter_mut().for_each(|shares| shares.push(0));
+            self.stacks.len() - 1
+        });
+        self.matrix.iter().position(|shares| shares[number] == ONE).unwrap_or_else(|| {
+            let mut shares = vec![0; self.stacks.len()];
+            shares[number] = ONE;
+            self.matrix.push(shares);
+            self.matrix.len() - 1
+        })
+    }
+
+    /// The mixtures after `change` of those that it changes; it is told the number of each and its weights, which sum to 1.
+    fn changed(self, change: impl Fn(usize, &mut [f64])) -> Result<InkMix, WeightError> {
+        let Wider { stacks, maps, matrix } = self;
+        let (old, channels) = (maps.channels(), matrix.len());
+        let mut data = vec![0; maps.data().len() / old * channels];
+        let nodes = data.chunks_exact_mut(channels).zip(maps.data().chunks_exact(old));
+        for (node, (out, weights)) in nodes.enumerate() {
+            let mut wanted: Vec<f64> =
+                weights.iter().map(|&weight| f64::from(weight) / f64::from(ONE)).collect();
+            wanted.resize(channels, 0.0);
+            let before = wanted.clone();
+            change(node, &mut wanted);
+            out[..old].copy_from_slice(weights);
+            if wanted != before {
+                wanted.iter_mut().for_each(|weight| *weight *= f64::from(ONE));
+                quantise(&wanted, out);
+            }
+        }
+        let maps = WeightMaps::new(maps.width(), maps.height(), channels, data)?;
+        Ok(InkMix { stacks, maps, matrix })
+    }
 }
 
 /// The lattices as a document: one matte pixel for every node, in order of intent, red, green and blue.
@@ -206,7 +231,8 @@ pub(super) struct Lattice {
     space: Space,
     pub paper: Vec<f64>,
     black: Vec<f64>,
-    /// What is printed for each node, between black and paper.
+    /// What each stack looks like and what is printed for each node, between black and paper.
+    stacks: Vec<Light>,
     light: Vec<Light>,
 }
 
@@ -236,7 +262,8 @@ impl Lattice {
                 (row[from + c] - black[from + c]) / (paper[from + c] - black[from + c]).max(1e-9)
             })
         };
-        let hull = Hull::new(&printable.curves.rows().map(body).collect::<Vec<_>>());
+        let stacks: Vec<Light> = printable.curves.rows().map(body).collect();
+        let hull = Hull::new(&stacks);
         let level = |i: usize| (i as f64 / (NODES - 1) as f64).powf(1.0 / gamma);
         let level: [f64; NODES] =
             std::array::from_fn(|i| f64::from(appearance::srgb::decode(level(i) as f32)));
@@ -252,7 +279,24 @@ impl Lattice {
             nodes
         });
         let light = light.collect();
-        Lattice { space, paper, black, light }
+        Lattice { space, paper, black, stacks, light }
+    }
+
+    /// Makes the mixtures of the lattice number `lattice` those that are most even in lightness, of the stacks of `printable`. Greys stay as they are:
+    /// black and paper, whose hue no error of the printer changes.
+    pub fn even(&self, mix: InkMix, lattice: usize, printable: &Printable) -> Result<InkMix, WeightError> {
+        let even = Even::new(&self.stacks);
+        let mut wider = Wider::new(mix);
+        let channels: Vec<usize> = printable.stacks.iter().map(|stack| wider.channel(stack)).collect();
+        wider.changed(|node, out| {
+            let Some(node) = node.checked_sub(lattice * ALL).filter(|&node| node < ALL) else { return };
+            let [r, g, b] = [node / (NODES * NODES), node / NODES % NODES, node % NODES];
+            let shares = even.shares(self.light[lattice * ALL + node]).filter(|_| r != g || g != b);
+            if let Some(shares) = shares {
+                out.fill(0.0);
+                shares.into_iter().for_each(|(stack, share)| out[channels[stack]] += share);
+            }
+        })
     }
 }
 

@@ -7,9 +7,12 @@
 //! would be more ink than was asked.
 //! Cost: a look at each dot, and some 100 ns at an edge.
 
+use super::super::key::{Key, colour};
 use super::mixtures::{Stops, shares, stops};
-use super::{FLAT, Key, colour};
 use appearance::weights::ONE;
+
+/// Marks the colour of a flat dot.
+pub(super) const FLAT: Key = 1 << 25;
 
 /// The least difference in red, green or blue of the colours beside an edge.
 const APART: u8 = 40;

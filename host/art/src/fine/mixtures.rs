@@ -9,7 +9,7 @@
 
 use inks::Stack;
 
-use super::super::colour::Fit;
+use super::super::fit::Fit;
 use super::super::lattice::{ALL, NODES};
 use super::super::solids::Solids;
 use appearance::weights::ONE;
@@ -21,7 +21,10 @@ const LEAST: u16 = (ONE as u32 * 3 / 100) as u16;
 pub type Stops<const N: usize> = [u16; N];
 
 /// The mixtures of all colours.
-pub struct Mixtures<const N: usize> {
+pub struct Mixtures<'a, const N: usize> {
+    solids: &'a Solids<'a>,
+    /// The stacks in the order of lightness.
+    stacks: Vec<Stack>,
     /// Stops of the nodes of each lattice.
     nodes: Vec<Stops<N>>,
     /// Places of the 256 values between nodes.
@@ -36,9 +39,9 @@ pub struct Mixtures<const N: usize> {
     pub order: [u8; N],
 }
 
-impl<const N: usize> Mixtures<N> {
+impl<'a, const N: usize> Mixtures<'a, N> {
     /// Of a fit with at most `N` stacks.
-    pub fn new(fit: &Fit, solids: &Solids<'_>) -> Mixtures<N> {
+    pub fn new(fit: &Fit, solids: &'a Solids<'a>) -> Mixtures<'a, N> {
         let mut numbers: Vec<usize> = (0..fit.stacks.len()).collect();
         let luminance = |stack: &Stack| {
             let [r, g, b] = solids.body(stack);
@@ -67,6 +70,8 @@ impl<const N: usize> Mixtures<N> {
             numbers.iter().position(|&q| fit.stacks[q] == stack)
         });
         Mixtures {
+            solids,
+            stacks: numbers.iter().map(|&q| fit.stacks[q].clone()).collect(),
             nodes: nodes.collect(),
             steps: fit.steps,
             lattices: [0, fit.of_drawings],
@@ -82,7 +87,14 @@ impl<const N: usize> Mixtures<N> {
             return None;
         }
         let bits = colour.iter().fold(0, |bits, &v| 2 * bits + usize::from(v > 0));
-        self.named[bits].map(|named| std::array::from_fn(|q| if q < named { 0 } else { ONE }))
+        self.named[bits].map(alone)
+    }
+
+    /// The stops of the colour of a label: its solid, if there is one.
+    pub fn label(&self, colour: [u8; 3]) -> Stops<N> {
+        let solid = self.solids.nearest(colour);
+        let at = solid.and_then(|solid| self.stacks.iter().position(|known| known == solid));
+        self.named(colour).or(at.map(alone)).unwrap_or_else(|| self.flat(colour, true))
     }
 
     /// The stops of a colour of a picture, or of text or a drawing.
@@ -153,6 +165,11 @@ impl<const N: usize> Mixtures<N> {
         let reached: u16 = stops.iter().map(|&stop| u16::from(stop <= threshold)).sum();
         reached.into()
     }
+}
+
+/// The stops of a stack alone.
+fn alone<const N: usize>(stack: usize) -> Stops<N> {
+    std::array::from_fn(|q| if q < stack { 0 } else { ONE })
 }
 
 /// The share of each stack.

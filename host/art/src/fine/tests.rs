@@ -2,15 +2,15 @@
 
 use std::sync::LazyLock;
 
-use super::super::compose::Settings;
+use super::super::fit::Wishes;
+use super::super::intent::Intent;
+use super::super::key::key;
 use super::super::kinds::ObjectType;
 use super::super::pixels::Pixels;
 use super::*;
-use crate::Colour;
 use appearance::brdf::Space;
 use appearance::document::SAMPLES;
 use appearance::gamut::Printable;
-use halftone::Method;
 use halftone::green_noise::USUAL;
 use inks::{InkSet, Library};
 use observe::Silent;
@@ -24,15 +24,8 @@ pub(super) static INKS: LazyLock<(Fit, Solids<'static>)> = LazyLock::new(|| {
     let printable: &'static Printable =
         Box::leak(Box::new(Printable::from_library(&Library::builtin(), &process, &space)));
     let solids = Solids::new(printable, &space);
-    let colours = Colour { pixels: Some(Pixels::default()), ..Colour::default() };
-    let fit = colours
-        .fit(
-            (printable, &solids),
-            space,
-            &Settings { halftone: Method::Fine, ..Settings::default() },
-            &Silent,
-        )
-        .unwrap();
+    let wishes = Wishes { intent: Intent::Auto, gamma: 1.0, has_drawings: true };
+    let fit = Fit::new((printable, &solids), space, &wishes, &Silent).unwrap();
     (fit, solids)
 });
 
@@ -56,7 +49,7 @@ impl Art {
         let bytes = self.rgb.iter().flat_map(|&[r, g, b]| [tag, r, g, b]).collect();
         let pixels = Pixels { bytes, each: 4, width: self.width, height: self.height };
         let (fit, solids) = &*INKS;
-        super::dots(pixels.rows(dots), dots, fit, solids, Table::for_cluster(USUAL))
+        super::dots(pixels.rows(dots, false), dots, fit, solids, Table::for_cluster(USUAL))
     }
 
     fn at_dots(&self) -> Vec<u8> {

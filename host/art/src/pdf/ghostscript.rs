@@ -11,8 +11,7 @@
 //! corners of a shading first, so narrow stripes may become one colour; a note says so.
 
 use std::ffi::OsStr;
-use std::fs::File;
-use std::io::{self, Read as _};
+use std::io::Read as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -32,16 +31,6 @@ const SPEAKS: &str = "userdict /QUIET false put";
 const ONE_COPY: &str = "-dNumCopies=1";
 const NO_COPIES: &str = "userdict begin /setpagedevice { dup /NumCopies known { dup length dict copy dup /NumCopies undef } if \
     systemdict /setpagedevice get exec } bind def end";
-
-/// Whether a document is PDF.
-///
-/// # Errors
-/// Those of opening it.
-pub(super) fn is_pdf(path: &Path) -> io::Result<bool> {
-    let mut start = [0; 4];
-    let mut file = File::open(path)?;
-    Ok(file.read_exact(&mut start).is_ok() && &start == b"%PDF")
-}
 
 /// Ghostscript's interpreter of PDF.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -74,7 +63,7 @@ pub fn command<O: AsRef<OsStr>>(
     // What the options run needs the device.
     command.args(options);
     // What warns of a box in EPS does not work when it may speak.
-    let first = if is_pdf(path).unwrap_or(false) { SPEAKS } else { NO_COPIES };
+    let first = if complaint::is_pdf(path).unwrap_or(false) { SPEAKS } else { NO_COPIES };
     command.args(["-c", first, "-f"]);
     command.arg(std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()));
     command

@@ -179,6 +179,13 @@ impl Choice for White {
     ];
 }
 
+impl Choice for art::Text {
+    const ALL: &'static [(art::Text, &'static str, &'static str)] = &[
+        (art::Text::Mixed, "mixed", "In its colour, mixed dot by dot like everything else"),
+        (art::Text::Solid, "solid", "In the nearest solid, if one looks about like its colour: for labels"),
+    ];
+}
+
 impl Choice for Finish {
     const ALL: &'static [(Finish, &'static str, &'static str)] = &[
         (Finish::Artwork, "artwork", "On everything that is drawn"),

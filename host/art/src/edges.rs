@@ -6,6 +6,7 @@
 //! are followed to where the picture differs no more, at most [`FAR_MM`] away: to the two colours of an edge, of which one at least
 //! fills 2 x 2 pixels. If the four lie between these two colours, within [`OFF`], each has a coverage, and the dot has one of the two
 //! colours: by whether the coverage between the pixels is half. What is left is a tone.
+//! Where pixels are dots, one that is softened takes the nearer of the two colours.
 //! A stroke may be nowhere as dark as it was drawn. So the colour of one that fills no 2 x 2 pixels is the one that is farthest from the
 //! ground where the stroke goes on within [`FAR_MM`], unless less than [`STROKE`] of that colour is left here.
 //! Cost: 5 ns a dot, some 300 ns at an edge; a byte a pixel. Limits: corners are rounded by half a pixel; what is fainter than
@@ -15,7 +16,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::{DRAWN, Key, colour, key};
+use super::key::{DRAWN, Key, colour, key};
 
 /// The largest difference in red, green or blue of pixels that are a tone.
 const TONE: u8 = 12;
@@ -23,11 +24,13 @@ const TONE: u8 = 12;
 const OFF: f32 = 20.0;
 /// How far away the colours of an edge may lie.
 const FAR_MM: f64 = 1.0;
+/// So many of a pixel and its eight neighbours that are about one colour are an area; along a softened edge there are three.
+const AREA: usize = 5;
 /// The least part of a stroke's colour that is the stroke.
 const STROKE: f32 = 0.6;
 
 /// A picture whose edges are hard at the dots.
-pub struct Edges<F> {
+pub(super) struct Edges<F> {
     pixel: F,
     width: usize,
     height: usize,
@@ -37,6 +40,8 @@ pub struct Edges<F> {
     /// Pixels that have 2 x 2 of one colour near.
     near: Vec<bool>,
     far: usize,
+    /// Whether there is a pixel for each dot.
+    are_dots: bool,
 }
 
 /// What lies between four pixels.
@@ -50,11 +55,12 @@ enum Between {
 impl<F: Fn(usize, usize) -> Key + Sync> Edges<F> {
     /// Of so many pixels and dots; `dpi` is that of the pixels.
     pub fn new(pixel: F, (width, height): (usize, usize), dots: (usize, usize)) -> Edges<F> {
+        let are_dots = (width, height) == dots;
         let dpi = 600.0 * (width as f64 / dots.0 as f64).max(height as f64 / dots.1 as f64);
         let far = ((FAR_MM * dpi / 25.4).round() as usize).clamp(2, 8);
         let near = near_flat(&pixel, (width, height), far);
         let (columns, rows) = (between(dots.0, width), between(dots.1, height));
-        Edges { pixel, width, height, columns, rows, near, far }
+        Edges { pixel, width, height, columns, rows, near, far, are_dots }
     }
 
     /// The colours of rows of dots.
@@ -83,29 +89,48 @@ impl<F: Fn(usize, usize) -> Key + Sync> Edges<F> {
     }
 
     fn between(&self, left: usize, top: usize) -> Between {
+        if self.are_dots {
+            return self.own(left, top);
+        }
         let (right, bottom) = ((left + 1).min(self.width - 1), (top + 1).min(self.height - 1));
         let places = [(left, top), (right, top), (left, bottom), (right, bottom)];
-        let keys = places.map(|(x, y)| (self.pixel)(x, y));
+        let keys = places.map(|place| self.at(place));
         if keys.iter().all(|&key| key == keys[0]) {
             return Between::Plain(keys[0]);
         }
-        let [a, b, c, d] = keys.map(colour);
-        let range = |v: usize| a[v].max(b[v]).max(c[v]).max(d[v]) - a[v].min(b[v]).min(c[v]).min(d[v]);
-        if (0..3).all(|v| range(v) <= TONE) || !self.near[top * self.width + left] {
+        if is_tone(&keys) || !self.near[top * self.width + left] {
             return Between::Tone(keys);
         }
-        self.edge(places, keys).unwrap_or(Between::Tone(keys))
+        self.edge(&places, keys).unwrap_or(Between::Tone(keys))
     }
 
-    /// The edge between four pixels.
-    fn edge(&self, places: [(usize, usize); 4], keys: [Key; 4]) -> Option<Between> {
-        let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
-        let apart = |&(a, b): &(usize, usize)| square(minus(light(keys[a]), light(keys[b])));
-        let (a, b) = pairs.into_iter().max_by(|one, other| apart(one).total_cmp(&apart(other)))?;
+    /// What a pixel is that is a dot: only one that is softened changes.
+    fn own(&self, x: usize, y: usize) -> Between {
+        let own = self.at((x, y));
+        let is_corner = colour(own).iter().all(|&v| v == 0 || v == 255);
+        if is_corner || !self.near[y * self.width + x] || self.is_flat((x, y)) {
+            return Between::Plain(own);
+        }
+        let mut places = [(x, y); 9];
+        places.iter_mut().zip(self.around((x, y))).for_each(|(place, near)| *place = near);
+        let like = places.iter().filter(|place| is_tone(&[own, self.at(**place)])).count();
+        if like >= AREA {
+            return Between::Plain(own);
+        }
+        self.edge(&places, [own; 4]).unwrap_or(Between::Plain(own))
+    }
+
+    /// The edge between pixels, of which `keys` are to be divided.
+    fn edge(&self, places: &[(usize, usize)], keys: [Key; 4]) -> Option<Between> {
+        let apart =
+            |a: (usize, usize), b: (usize, usize)| square(minus(light(self.at(a)), light(self.at(b))));
+        let pairs =
+            places.iter().enumerate().flat_map(|(n, &a)| places[n + 1..].iter().map(move |&b| (a, b)));
+        let (a, b) = pairs.max_by(|one, other| apart(one.0, one.1).total_cmp(&apart(other.0, other.1)))?;
         // From each away from the other.
-        let first = self.follow(places[a], light(keys[b]));
-        let second = self.follow(places[b], light(self.at(first)));
-        let first = self.follow(first, light(self.at(second)));
+        let first = self.follow(a, light(self.at(b)))?;
+        let second = self.follow(b, light(self.at(first)))?;
+        let first = self.follow(first, light(self.at(second)))?;
         let (ground, stroke) = match (self.is_flat(first), self.is_flat(second)) {
             (true, true) => return Between::of(self.at(first), self.at(second), keys),
             (true, false) => (first, second),
@@ -160,21 +185,22 @@ impl<F: Fn(usize, usize) -> Key + Sync> Edges<F> {
         })
     }
 
-    /// Where the picture is farthest from a colour, followed from one pixel to the next.
-    fn follow(&self, from: (usize, usize), away: [f32; 3]) -> (usize, usize) {
+    /// Where the picture is farthest from a colour, followed from one pixel to the next; `None` if it goes on as far as is looked: that is a
+    /// shading.
+    fn follow(&self, from: (usize, usize), away: [f32; 3]) -> Option<(usize, usize)> {
         let far = |place: (usize, usize)| square(minus(light(self.at(place)), away));
         let mut at = (from, far(from));
-        for _ in 0..self.far {
+        for _ in 0..=self.far {
             if self.is_flat(at.0) {
-                break;
+                return Some(at.0);
             }
             let next = self.around(at.0).map(|place| (place, far(place)));
             match next.max_by(|one, other| one.1.total_cmp(&other.1)) {
                 Some(next) if next.1 > at.1 => at = next,
-                _ => break,
+                _ => return Some(at.0),
             }
         }
-        at.0
+        None
     }
 
     /// The colour farthest from the ground that a stroke has near a place.
@@ -216,6 +242,14 @@ impl Between {
         let covered = parts.map(|(part, _)| (255.0 * part.clamp(0.0, 1.0)).round() as u8);
         all.then_some(Between::Edge([first, second], covered))
     }
+}
+
+/// Whether pixels are about one colour.
+fn is_tone(keys: &[Key]) -> bool {
+    (0..3).all(|c| {
+        let range = keys.iter().map(|&key| colour(key)[c]).fold((255, 0), |(a, b), v| (v.min(a), v.max(b)));
+        range.1.saturating_sub(range.0) <= TONE
+    })
 }
 
 /// How far on the way from one colour to another a third is, and how far beside it.
