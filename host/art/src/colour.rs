@@ -12,7 +12,7 @@ use protocol::ink::Ink;
 use rayon::prelude::*;
 
 use super::bitplane;
-use super::error::not_halftoned;
+use super::error::{no_cluster, not_halftoned};
 use super::fine;
 use super::fit::{Fit, Wishes};
 use super::intent::Intent;
@@ -166,8 +166,7 @@ impl Colour {
         let mut fit = Fit::new((&printable, &solids), space, &wishes, observer)?;
         let rows = self.rows(dots, how.labels);
         if how.halftone == Method::Fine {
-            let minimum = fit.stacks.iter().map(|stack| library.minimum_cluster(stack)).max();
-            let table = Table::for_cluster(minimum.unwrap_or_default());
+            let table = Table::for_cluster(largest_cluster(inks, library)?);
             let index = fine::dots(rows, dots, &fit, &solids, table);
             return Ok((fit.stacks, index));
         }
@@ -202,6 +201,12 @@ impl Colour {
         self.rows(dots, false)(0..dots.1, &mut keys);
         keys
     }
+}
+
+/// The minimum cluster of the most demanding of these inks.
+pub(super) fn largest_cluster(inks: &InkSet, library: &Library) -> Result<u16, Diagnosis> {
+    let cluster = |ink: Ink| Some(library.cartridge(ink)?.minimum_cluster.get());
+    inks.iter().try_fold(1, |most, ink| Ok(most.max(cluster(ink).ok_or_else(|| no_cluster(ink))?)))
 }
 
 /// The inks of black: black ink or, without it, the darkest stack of these process inks.

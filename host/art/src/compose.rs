@@ -128,7 +128,7 @@ fn drawn_slots(
     tell: &mut dyn FnMut(String),
 ) -> Result<Vec<Slot>, Diagnosis> {
     let mut slots: Vec<Slot> = Vec::new();
-    let mut together = picked_together(art, settings, library);
+    let mut together = picked_together(art, settings, library)?;
     for (at, layer) in art.layers.iter().enumerate() {
         let name = layer.ink.name();
         let unwanted = match layer.ink {
@@ -187,7 +187,11 @@ fn drawn_slots(
 }
 
 /// The numbers of the layers with tones of process inks whose dots are picked from one table, and their dots.
-fn picked_together(art: &Artwork, settings: &Settings, library: &Library) -> Vec<(usize, Plane)> {
+fn picked_together(
+    art: &Artwork,
+    settings: &Settings,
+    library: &Library,
+) -> Result<Vec<(usize, Plane)>, Diagnosis> {
     let mut found: Vec<(usize, (Ink, &[u8]))> = Vec::new();
     let is_known = |found: &[(usize, (Ink, &[u8]))], ink: Ink| found.iter().any(|(_, plate)| plate.0 == ink);
     for (at, layer) in art.layers.iter().enumerate() {
@@ -200,10 +204,10 @@ fn picked_together(art: &Artwork, settings: &Settings, library: &Library) -> Vec
     }
     found.truncate(plates::MOST);
     if found.is_empty() {
-        return Vec::new();
+        return Ok(Vec::new());
     }
     let (numbers, together): (Vec<usize>, Vec<(Ink, &[u8])>) = found.into_iter().unzip();
-    numbers.into_iter().zip(plates::picked(&together, art.width, library)).collect()
+    Ok(numbers.into_iter().zip(plates::picked(&together, art.width, library)?).collect())
 }
 
 /// Halftones a layer with tones, in clusters large enough for its ink.

@@ -111,8 +111,7 @@ impl<F: Fn(usize, usize) -> Key + Sync> Edges<F> {
         if is_corner || !self.near[y * self.width + x] || self.is_flat((x, y)) {
             return Between::Plain(own);
         }
-        let mut places = [(x, y); 9];
-        places.iter_mut().zip(self.around((x, y))).for_each(|(place, near)| *place = near);
+        let places: Vec<(usize, usize)> = self.around((x, y)).collect();
         let like = places.iter().filter(|place| is_tone(&[own, self.at(**place)])).count();
         if like >= AREA {
             return Between::Plain(own);

@@ -26,7 +26,7 @@ use super::key::{DRAWN, Key, LABEL, colour};
 use super::solids::Solids;
 use appearance::wide::wide;
 use halftone::green_noise::{SIDE, Table};
-use lean::{FLAT, Leans};
+use lean::{AREA, FLAT, Leans};
 use mixtures::{Mixtures, Stops};
 
 /// Rows of a strip.
@@ -36,6 +36,8 @@ const STRIP: usize = 64;
 const HALO: usize = 4;
 /// Neighbours of its very colour that make a dot flat: a line of one dot has two.
 const ALIKE: u8 = 2;
+/// All of them.
+const ALL: u8 = 8;
 
 /// The number of the stack of every dot. `rows` writes the colours of rows of dots.
 pub(super) fn dots(
@@ -148,6 +150,7 @@ fn mark_flat(out: &mut [Key], around: [Option<&[Key]>; 3]) {
     }
     for (out, alike) in out.iter_mut().zip(alike) {
         *out |= if alike >= ALIKE { FLAT } else { 0 };
+        *out |= if alike == ALL && *out & DRAWN == 0 { AREA } else { 0 };
     }
 }
 
@@ -172,10 +175,12 @@ impl<'a, const N: usize> Known<'a, N> {
         let known = &mut self.last[(key.wrapping_mul(0x9e37_79b1) >> 22) as usize % KEPT];
         if known.0 != key {
             let drawn = key & DRAWN > 0;
-            let stops = match (key & LABEL, key & FLAT) {
-                (LABEL, _) => self.mixtures.label(colour(key)),
-                (_, 0) => self.mixtures.stops(colour(key), drawn),
-                _ => self.mixtures.flat(colour(key), drawn),
+            // The step of a shading in a picture is no colour of its own.
+            let is_flat = key & if drawn { FLAT } else { AREA } > 0;
+            let stops = match key & LABEL > 0 {
+                true => self.mixtures.label(colour(key)),
+                false if is_flat => self.mixtures.flat(colour(key), drawn),
+                false => self.mixtures.stops(colour(key), drawn),
             };
             *known = (key, stops);
         }
@@ -187,7 +192,8 @@ impl<'a, const N: usize> Known<'a, N> {
         if let Some(stops) = self.leaning.get(&key) {
             return *stops;
         }
-        let (own, other) = (*self.stops(lean.own), *self.stops(lean.other));
+        // Beside an edge a colour of a picture is an area, too.
+        let (own, other) = (*self.stops(lean.own | AREA), *self.stops(lean.other | AREA));
         let stops = lean::leaning(&own, &other, lean.at_edge);
         self.leaning.insert(key, stops);
         stops

@@ -1,5 +1,5 @@
 //! Makes the table of green noise for a minimum cluster and writes its ranks to standard output, two bytes each:
-//! `cargo run -p foilpress-halftone --example green_noise 8 > host/halftone/src/green_noise/8.bin`.
+//! `cargo run -p foilpress-halftone --example green_noise 4 > host/halftone/src/green_noise/4.bin`.
 
 use std::io::Write;
 

@@ -7,7 +7,7 @@
 //! cluster of the inks, so the machine decides and not the art. The table for [`USUAL`] dots is stored, others are made when they
 //! are asked for.
 //! Cost: nothing for the stored one, about a second for another. Memory: 128 KiB.
-//! Limits: the minimum cluster is the mean at three tenths of the area. At a twentieth, clusters are a fifth of it.
+//! Limits: the minimum cluster is about the mean at a sixth of the area. At a twentieth, clusters are a third of it.
 //! Source: R. Ulichney, The void-and-cluster method for dither array generation (1993); D. Lau, G. Arce, N. Gallagher, Green-noise
 //! digital halftoning (1998), for clusters of a chosen size.
 
@@ -21,10 +21,10 @@ use appearance::weights::ONE;
 pub const SIDE: usize = 256;
 
 /// The minimum cluster whose table is stored: that of the process inks in the built-in library.
-pub const USUAL: u16 = 8;
+pub const USUAL: u16 = 4;
 
 /// The ranks of the table for [`USUAL`], two bytes each, the low one first.
-static STORED: &[u8; 2 * SIDE * SIDE] = include_bytes!("green_noise/8.bin");
+static STORED: &[u8; 2 * SIDE * SIDE] = include_bytes!("green_noise/4.bin");
 
 /// Thresholds, row by row.
 pub struct Table(Vec<u16>);

@@ -45,8 +45,10 @@ fn pages_are_chosen_or_given_their_inks_on_the_command_line() {
     fs::write(bench.path("pages.ps"), PAGES).unwrap();
     let before = bench.entries();
     let said = bench.refused(1, "layers pages.ps --paper postcard");
-    assert!(said.contains("art on 3 pages (1, 2, 3)") && said.contains("--page 1 reads one page"), "{said}");
-    assert!(said.contains("--pages white,gold,black reads one page per ink"), "{said}");
+    assert!(
+        said.contains("art on 3 pages (1, 2, 3)") && said.contains("--page 1, --pages white,gold,black"),
+        "{said}"
+    );
     bench.refused(2, "layers pages.ps --page 1 --pages white");
     assert!(bench.refused(2, "layers pages.ps --pages white,blak").contains("did you mean `black`?"));
     assert_eq!(bench.entries(), before);

@@ -10,12 +10,14 @@ use inks::{InkSet, Library, Stack};
 use protocol::ink::Ink;
 use rayon::prelude::*;
 
+use super::super::colour::largest_cluster;
 use super::super::solids::Solids;
 use appearance::brdf::Space;
 use appearance::document::SAMPLES;
 use appearance::gamut::Printable;
 use appearance::weights::ONE;
 use halftone::green_noise::{SIDE, Table};
+use observe::Diagnosis;
 use sheet::{Plane, pack};
 
 /// Plates that are picked together, one for each process ink.
@@ -24,10 +26,13 @@ pub(super) const MOST: usize = 4;
 const SETS: usize = 1 << MOST;
 
 /// The dots of each of at most [`MOST`] plates with these inks, a byte of coverage a dot in rows of `width`.
-pub(super) fn picked(plates: &[(Ink, &[u8])], width: usize, library: &Library) -> Vec<Plane> {
+pub(super) fn picked(
+    plates: &[(Ink, &[u8])],
+    width: usize,
+    library: &Library,
+) -> Result<Vec<Plane>, Diagnosis> {
     let inks = InkSet::of(plates.iter().map(|(ink, _)| *ink));
-    let minimum = plates.iter().map(|(ink, _)| library.minimum_cluster(&Stack::new([*ink]))).max();
-    let table = Table::for_cluster(minimum.unwrap_or(1));
+    let table = Table::for_cluster(largest_cluster(&inks, library)?);
     let order = by_lightness(plates, &inks, library);
     let dots = plates.first().map_or(0, |(_, plate)| plate.len());
     let mut index = vec![0u8; dots];
@@ -44,7 +49,7 @@ pub(super) fn picked(plates: &[(Ink, &[u8])], width: usize, library: &Library) -
         }
     });
     let sets = std::array::from_fn(|set| set as u16);
-    pack::pack(width, &index, &sets, plates.len())
+    Ok(pack::pack(width, &index, &sets, plates.len()))
 }
 
 /// The share of each set of plates in 1/255^4.
@@ -94,7 +99,7 @@ mod tests {
             let plates = [c, m, k].map(|covered| vec![covered; dots]);
             let inks = [Ink::Cyan, Ink::Magenta, Ink::Black];
             let given: Vec<(Ink, &[u8])> = inks.into_iter().zip(plates.iter().map(Vec::as_slice)).collect();
-            let found = picked(&given, width, &Library::builtin());
+            let found = picked(&given, width, &Library::builtin()).unwrap();
             let share = |dots: u64| dots as f64 / (SIDE * SIDE) as f64;
             for (plane, covered) in found.iter().zip([c, m, k]) {
                 let off = share(plane.dots()) - f64::from(covered) / 255.0;
@@ -109,7 +114,7 @@ mod tests {
     #[test]
     fn a_plate_that_is_all_or_nothing_is_that() {
         let (ink, cyan) = ([0u8, 255, 0, 255], [0u8, 0, 255, 255]);
-        let found = picked(&[(Ink::Black, &ink), (Ink::Cyan, &cyan)], 4, &Library::builtin());
+        let found = picked(&[(Ink::Black, &ink), (Ink::Cyan, &cyan)], 4, &Library::builtin()).unwrap();
         assert_eq!([found[0].bits[0] >> 4, found[1].bits[0] >> 4], [0b0101, 0b0011]);
     }
 }

@@ -13,6 +13,8 @@ use appearance::weights::ONE;
 
 /// Marks the colour of a flat dot.
 pub(super) const FLAT: Key = 1 << 25;
+/// Marks the colour of a dot of a picture amid its like.
+pub(super) const AREA: Key = 1 << 27;
 
 /// The least difference in red, green or blue of the colours beside an edge.
 const APART: u8 = 40;
@@ -121,7 +123,7 @@ impl<'a> Leans<'a> {
                 let ((Some(behind), Some(beyond)), true) = ((at(-1), at(1)), side > 0) else { continue };
                 let number = |(x, y): (usize, usize)| y * self.width + x;
                 // What is flat beside its like is, too.
-                let like = |key: Key| key & !FLAT == own & !FLAT;
+                let like = |key: Key| key & !(FLAT | AREA) == own & !(FLAT | AREA);
                 if !like(self.keys[number(behind)]) || self.edges[number(behind)] > 0 {
                     continue;
                 }

@@ -85,7 +85,11 @@ fn a_colour_that_is_a_stack_is_that_stack() {
                 _ => [200, 190, 120],
             });
             let dots = art.dots(kind, (64, 64));
-            for (at, _) in art.rgb.iter().enumerate().filter(|(_, found)| **found == colour) {
+            // What is nearly a stack is one in areas of pictures, and everywhere in drawings.
+            let is_corner = colour.iter().all(|&v| v == 0 || v == 255);
+            let inside = |at: usize| (5..39).contains(&(at % 64)) && (5..39).contains(&(at / 64));
+            let all = art.rgb.iter().enumerate().filter(|(_, found)| **found == colour);
+            for (at, _) in all.filter(|&(at, _)| is_corner || kind == ObjectType::Drawing || inside(at)) {
                 assert_eq!(dots[at], stack(name), "{colour:?} of {kind:?} at {}, {}", at % 64, at / 64);
             }
         }
