@@ -18,6 +18,9 @@ pub const DEVICE: &str = "bitrgbtags";
 /// Bytes of a pixel: its tag, red, green and blue.
 pub const BYTES: usize = 4;
 
+/// What Ghostscript makes of full K and nothing else in a picture, whose colours it converts with a profile.
+pub(super) const K_OF_PICTURES: [u8; 3] = [35, 31, 32];
+
 /// What drew a pixel.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub enum ObjectType {

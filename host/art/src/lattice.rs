@@ -110,6 +110,9 @@ const NEAR: f64 = 4.0;
 /// The same for the lines from white, as a share of the distance from white.
 const NEAR_IN_HUE: f64 = 1.0 / 8.0;
 
+/// Up to so many nodes between its channels a colour is about grey.
+const GREY: usize = 1;
+
 /// What a colour is made of as tints: paper, a primary, and the secondary towards which its hue is turned.
 struct Tint {
     /// Which of red, green and blue have all of their light, a bit each, and the share of each.
@@ -282,7 +285,7 @@ impl Lattice {
         Lattice { space, paper, black, stacks, light }
     }
 
-    /// Makes the mixtures of the lattice number `lattice` those that are most even in lightness, of the stacks of `printable`. Greys stay as they are:
+    /// Makes the mixtures of the lattice number `lattice` those that are most even in lightness, of the stacks of `printable`. What is about grey stays as it is:
     /// black and paper, whose hue no error of the printer changes.
     pub fn even(&self, mix: InkMix, lattice: usize, printable: &Printable) -> Result<InkMix, WeightError> {
         let even = Even::new(&self.stacks);
@@ -291,7 +294,8 @@ impl Lattice {
         wider.changed(|node, out| {
             let Some(node) = node.checked_sub(lattice * ALL).filter(|&node| node < ALL) else { return };
             let [r, g, b] = [node / (NODES * NODES), node / NODES % NODES, node % NODES];
-            let shares = even.shares(self.light[lattice * ALL + node]).filter(|_| r != g || g != b);
+            let is_grey = r.max(g).max(b) - r.min(g).min(b) <= GREY;
+            let shares = even.shares(self.light[lattice * ALL + node]).filter(|_| !is_grey);
             if let Some(shares) = shares {
                 out.fill(0.0);
                 shares.into_iter().for_each(|(stack, share)| out[channels[stack]] += share);

@@ -9,8 +9,8 @@ use std::ops::Range;
 use std::sync::LazyLock;
 
 use super::edges::Edges;
-use super::key::{DRAWN, Key, colour, key, of_drawn};
-use super::kinds::{BYTES, split};
+use super::key::{BLACK, DRAWN, Key, colour, key, of_drawn};
+use super::kinds::{BYTES, K_OF_PICTURES, ObjectType, split};
 use super::resample;
 use appearance::srgb;
 
@@ -53,8 +53,10 @@ impl Pixels {
 
 #[inline]
 fn key_of<const N: usize>(pixel: &[u8; N], labels: bool) -> Key {
-    let (kind, colour) = split(pixel);
-    of_drawn(kind, colour, labels)
+    match split(pixel) {
+        (ObjectType::Picture, K_OF_PICTURES) if N == BYTES => BLACK,
+        (kind, colour) => of_drawn(kind, colour, labels),
+    }
 }
 
 fn row<const N: usize>(
