@@ -78,9 +78,7 @@ impl Colour {
         });
         let used = used.reduce(|| [false; 256], |a, b| std::array::from_fn(|at| a[at] | b[at]));
         let inked = colours.iter().zip(used).filter(|&(colour, used)| used && colour.1 != [255; 3]);
-        if inked.clone().next().is_none() {
-            return None;
-        }
+        inked.clone().next()?;
         if inked.clone().all(|(colour, _)| colour.1 == [0; 3]) {
             let black = |dot: u8| colours[usize::from(dot)].1 == [0; 3];
             return Some(Colour::black(bitplane::from_bytes(width, &index, black)));

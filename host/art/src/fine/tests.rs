@@ -96,6 +96,23 @@ fn a_colour_that_is_a_stack_is_that_stack() {
     }
 }
 
+/// Text alone, and only where a solid looks about like it.
+#[test]
+fn labels_are_in_the_nearest_solid() {
+    let dots = |colour: [u8; 3], tag: u8, labels: bool| {
+        let bytes = [tag, colour[0], colour[1], colour[2]].repeat(64 * 64);
+        let pixels = Pixels { bytes, each: 4, width: 64, height: 64 };
+        let (fit, solids) = &*INKS;
+        super::dots(pixels.rows((64, 64), labels), (64, 64), fit, solids, Table::for_cluster(USUAL))
+    };
+    let (dark, grey) = ([60; 3], [128; 3]);
+    assert!(dots(dark, ObjectType::TEXT, true).iter().all(|&dot| dot == stack("K")));
+    let mixed = dots(dark, ObjectType::TEXT, false);
+    assert!(mixed.contains(&stack("substrate")));
+    assert_eq!(dots(dark, ObjectType::DRAWING, true), mixed);
+    assert_eq!(dots(grey, ObjectType::TEXT, true), dots(grey, ObjectType::TEXT, false));
+}
+
 /// A stroke of three dots has two edges and one dot between them; the tone outside has the whole lean.
 #[test]
 fn a_tone_leans_to_its_edges_and_keeps_its_ink() {

@@ -29,6 +29,10 @@ const SPEAKS: &str = "userdict /QUIET false put";
 /// Copies are the print system's affair, and since 10.04 each copy of a page with tags has its bytes in another order. PostScript asks for copies in
 /// two ways.
 const ONE_COPY: &str = "-dNumCopies=1";
+/// A page that fits into memory loses its spot plates where something is transparent; in bands it keeps them.
+const ALL_PLATES: &str = "-dMaxBitmap=0";
+/// Pictures are drawn pixel by pixel, whatever the document asks for: interpolated, art in one bit has tones.
+const AS_THEY_ARE: &str = "-dNOINTERPOLATE";
 const NO_COPIES: &str = "userdict begin /setpagedevice { dup /NumCopies known { dup length dict copy dup /NumCopies undef } if \
     systemdict /setpagedevice get exec } bind def end";
 
@@ -55,7 +59,16 @@ pub fn command<O: AsRef<OsStr>>(
     command
         .current_dir(folder)
         .env("TMPDIR", folder)
-        .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-sstdout=%stderr", ONE_COPY])
+        .args([
+            "-q",
+            "-dSAFER",
+            "-dBATCH",
+            "-dNOPAUSE",
+            "-sstdout=%stderr",
+            ONE_COPY,
+            ALL_PLATES,
+            AS_THEY_ARE,
+        ])
         .arg(format!("-dBufferSpace={BANDS}"));
     if interpreter == Interpreter::Older {
         command.arg("-dNEWPDF=false");

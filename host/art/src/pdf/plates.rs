@@ -7,7 +7,7 @@
 //! full tint. So a colour of several spots keeps each part. A name that resembles that of an ink is an error, because a
 //! slip would cost ribbon. The layers of art and the print queues use the same two functions, [`survey`] and [`separated`].
 //! If a process plate has tones, the page is drawn once more with the kind of each pixel, and what lies beside the layers is
-//! treated like any page: letters keep their outline. On dots of layers the process plates say what overprints.
+//! treated like any page: what drew a pixel decides how its colour is mixed. On dots of layers the process plates say what overprints.
 //! Cost: seconds a page, twice if it has tones. Limits: where a spot overprints, tints between none and full are taken as
 //! proportional.
 
