@@ -9,7 +9,8 @@ use rayon::prelude::*;
 
 use super::colour::Colour;
 use super::coverage::{Coverage, Scan};
-use super::flat::Flat;
+use super::edges::Edges;
+use super::key::{colour, key};
 use super::options::Options;
 use super::{bitplane, names, resample};
 use sheet::Plane;
@@ -18,6 +19,9 @@ use sheet::Plane;
 const THRESHOLD: u8 = 128;
 /// Coverage up to this is plainly paper; coverage from 255 minus this on is plainly ink.
 const PLAIN: u8 = 8;
+
+/// Rows of a plate that are read at once.
+const STRIP: usize = 64;
 
 /// What a layer prints.
 #[derive(Clone, Debug, PartialEq)]
@@ -156,10 +160,11 @@ fn layer(
     let size = (scan.width, scan.height);
     let coverage = match tones {
         true => {
-            let flat = flat(&scan.coverage, size).at_dots(size, (width, length));
-            let mut coverage = resample::tones(scan.coverage, size, (width, length));
-            exact(&mut coverage, &flat);
-            coverage
+            let finer = size.0 as usize > width || size.1 as usize > length;
+            match finer {
+                true => resample::tones(scan.coverage, size, (width, length)),
+                false => edged(&scan.coverage, size, (width, length)),
+            }
         }
         false => resample::solid(scan.coverage, size, (width, length)),
     };
@@ -173,19 +178,19 @@ fn layer(
     (layer, notes)
 }
 
-/// What is flat in a plate, as in a grey picture: beside tones the softened edges of letters are still edges.
-fn flat(coverage: &[u8], (width, _): (u32, u32)) -> Flat {
-    let grey: Vec<[u8; 3]> = coverage.par_iter().map(|&c| [255 - c; 3]).collect();
-    Flat::of(&grey, width as usize)
-}
-
-/// Gives the dots of flat areas and letters their own coverage, without what lies beside them.
-fn exact(coverage: &mut [u8], flat: &Flat) {
-    coverage.par_iter_mut().zip(&flat.index).for_each(|(coverage, &dot)| {
-        if let Some((_, [grey, ..])) = flat.colours.get(usize::from(dot)) {
-            *coverage = 255 - grey;
-        }
+/// The coverage of a plate at the dots, as of a grey picture: softened edges are hard, and tones are tones.
+fn edged(coverage: &[u8], (width, length): (u32, u32), dots: (usize, usize)) -> Vec<u8> {
+    let (width, length) = (width as usize, length as usize);
+    let grey = |x: usize, y: usize| key([255 - coverage[y * width + x]; 3], false);
+    let edges = Edges::new(grey, (width, length), dots);
+    let mut out = vec![0; dots.0 * dots.1];
+    out.par_chunks_mut(STRIP * dots.0).enumerate().for_each(|(number, out)| {
+        let (top, rows) = (STRIP * number, out.len() / dots.0);
+        let mut keys = vec![0; out.len()];
+        edges.read(top..top + rows, &mut keys);
+        out.iter_mut().zip(keys).for_each(|(out, key)| *out = 255 - colour(key)[0]);
     });
+    out
 }
 
 /// Coverage as a layer's shape.

@@ -10,6 +10,7 @@
 
 mod arrange;
 mod beds;
+mod plates;
 mod settings;
 mod slot;
 mod suggest;
@@ -21,6 +22,7 @@ use serde::Serialize;
 
 use super::artwork::{Artwork, Shape};
 use super::bitplane;
+use super::colour::How;
 use super::error::{
     foil, no_sheet, not_halftoned, nothing, only_white, too_many_passes, too_small, unfitted,
 };
@@ -28,7 +30,7 @@ use super::size::MM;
 use super::white::White;
 use appearance::gamut::InkMix;
 use appearance::weights::{ONE, WeightMaps};
-use halftone::halftone;
+use halftone::{Method, halftone};
 use observe::{Diagnosis, Observer};
 use sheet::DotMap;
 use sheet::order::customary;
@@ -38,7 +40,7 @@ use slot::{COLOURS, Slot};
 
 pub use arrange::Order;
 pub use beds::MOST_CHOKE_MM;
-pub use settings::{Finish, GAMMAS, Settings};
+pub use settings::{Finish, GAMMAS, Settings, Text};
 pub use slot::Laid;
 pub use suggest::{Accept, Remedy, Suggestion};
 
@@ -126,7 +128,8 @@ fn drawn_slots(
     tell: &mut dyn FnMut(String),
 ) -> Result<Vec<Slot>, Diagnosis> {
     let mut slots: Vec<Slot> = Vec::new();
-    for layer in &art.layers {
+    let mut together = picked_together(art, settings, library)?;
+    for (at, layer) in art.layers.iter().enumerate() {
         let name = layer.ink.name();
         let unwanted = match layer.ink {
             Ink::White => settings.white == Some(White::None),
@@ -146,7 +149,10 @@ fn drawn_slots(
         }
         let plane = match &layer.shape {
             Shape::Solid(plane) => plane.clone(),
-            Shape::Tone(coverage) => tone(coverage, art, layer.ink, settings, library, observer)?,
+            Shape::Tone(coverage) => match together.iter().position(|(number, _)| *number == at) {
+                Some(found) => together.swap_remove(found).1,
+                None => tone(coverage, art, layer.ink, settings, library, observer)?,
+            },
         };
         let (ink, from, place) = (layer.ink, layer.name.clone(), layer.place);
         slots.push(Slot { ink, from, place, plane, passes: 1 });
@@ -157,7 +163,13 @@ fn drawn_slots(
             tell("the picture's colours are left out, because no process ink is allowed".into());
             return Ok(slots);
         }
-        let planes = colour.planes((art.width, art.length), &process, settings, library, observer)?;
+        let how = How {
+            intent: settings.intent,
+            gamma: settings.gamma,
+            halftone: settings.halftone,
+            labels: settings.text == Text::Solid,
+        };
+        let planes = colour.planes((art.width, art.length), &process, how, library, observer)?;
         let mut spot = bitplane::blank(art.width, art.length);
         slots.iter().for_each(|slot| bitplane::add(&mut spot, &slot.plane));
         for (ink, mut plane) in planes {
@@ -172,6 +184,30 @@ fn drawn_slots(
         }
     }
     Ok(slots)
+}
+
+/// The numbers of the layers with tones of process inks whose dots are picked from one table, and their dots.
+fn picked_together(
+    art: &Artwork,
+    settings: &Settings,
+    library: &Library,
+) -> Result<Vec<(usize, Plane)>, Diagnosis> {
+    let mut found: Vec<(usize, (Ink, &[u8]))> = Vec::new();
+    let is_known = |found: &[(usize, (Ink, &[u8]))], ink: Ink| found.iter().any(|(_, plate)| plate.0 == ink);
+    for (at, layer) in art.layers.iter().enumerate() {
+        let is_process = layer.ink.kind() == Kind::Process && settings.inks.contains(layer.ink);
+        if let (Shape::Tone(coverage), true, false) =
+            (&layer.shape, is_process && settings.halftone == Method::Fine, is_known(&found, layer.ink))
+        {
+            found.push((at, (layer.ink, coverage)));
+        }
+    }
+    found.truncate(plates::MOST);
+    if found.is_empty() {
+        return Ok(Vec::new());
+    }
+    let (numbers, together): (Vec<usize>, Vec<(Ink, &[u8])>) = found.into_iter().unzip();
+    Ok(numbers.into_iter().zip(plates::picked(&together, art.width, library)?).collect())
 }
 
 /// Halftones a layer with tones, in clusters large enough for its ink.
@@ -191,10 +227,12 @@ fn tone(
     let stacks = vec![Stack::SUBSTRATE, Stack::new([ink])];
     let mix = InkMix { stacks, maps, matrix: vec![vec![ONE, 0], vec![0, ONE]] };
     let (width, height) = (art.width as u16, art.length as u16);
-    let toning = halftone::Settings {
-        method: settings.halftone,
-        ..halftone::Settings::from_library(&mix.stacks, library)
+    let method = match settings.halftone {
+        // Foils and metals need cells of their own.
+        Method::Fine if ink.kind() != Kind::Process => Method::Cells,
+        method => method,
     };
+    let toning = halftone::Settings { method, ..halftone::Settings::from_library(&mix.stacks, library) };
     // What the plate has wholly or not at all is no tone.
     let fixed = coverage.par_iter().map(|&c| match c {
         0 => 0,

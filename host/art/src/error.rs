@@ -231,3 +231,21 @@ pub(super) fn no_sheet(source: SheetError) -> Diagnosis {
 pub(super) fn resolution_in_words((x, y): (f64, f64)) -> String {
     if (x - y).abs() < 0.5 { format!("{x:.0} dpi") } else { format!("{x:.0} x {y:.0} dpi") }
 }
+/// An ink of which the library does not say how small its clusters may be.
+pub(super) fn no_cluster(ink: Ink) -> Diagnosis {
+    let problem = format!("the ink library does not say how small clusters of {} may be", ink.name());
+    Diagnosis::new(Fault::Setting, problem)
+        .hint(
+            "add the ink with its `minimum_cluster` to the library, leave it out, or choose another halftone",
+        )
+        .set("halftone", "cells")
+}
+
+/// An error about a page that has art, of which the ink that is named for it gets nothing.
+pub(super) fn no_dot(path: &Path, page: &str, ink: Ink) -> Diagnosis {
+    let problem = format!(
+        "{page} has art, but {} gets no dot of it: nothing on it is dark enough to be ink",
+        ink.name()
+    );
+    wrong(path, problem).hint("draw it in black, or in one colour on nothing")
+}

@@ -3,13 +3,14 @@
 //! Problem: four bytes a pixel are 140 MB for A4, most of them bare paper, and every look at them takes as long as drawing them
 //! did. Most pages that are not black alone are text in a few colours.
 //! Method: what draws a pixel and its colour have a number in the order in which they are first met; bare paper is 0. A
-//! page stays numbered while it has no tones of pictures and no more colours than a palette ([`Flat`]) holds.
+//! page stays numbered while it has no tones of pictures and no more than 256 colours.
 //! Cost: 0.1 ns a pixel of bare paper, 2 ns others. Limits: of a tag nothing is kept but its [`ObjectType`].
 
 use std::collections::HashMap;
 
-use super::flat::{Flat, INKED, WHITE, split};
-use super::kinds::{BYTES, ObjectType};
+use super::bitplane;
+use super::colour::Colour;
+use super::kinds::{BYTES, ObjectType, split};
 use super::window::Window;
 use sheet::Plane;
 
@@ -110,7 +111,7 @@ impl Numbered {
             return Some(number);
         }
         let tone = key.0 == ObjectType::Picture && key.1 != [255; 3] && key.1 != [0; 3];
-        let number = u8::try_from(self.colours.len()).ok().filter(|&number| !tone && number < INKED)?;
+        let number = u8::try_from(self.colours.len()).ok().filter(|_| !tone)?;
         self.numbers.insert(key, number);
         self.colours.push(key);
         Some(number)
@@ -154,31 +155,11 @@ impl Numbered {
         Some(Window { left, top, width: right + 1 - left, height: bottom + 1 - top })
     }
 
-    /// The flat colours in a window, which lies within the page.
-    pub fn flat(self, window: &Window) -> Flat {
-        let Numbered { colours, index, width, .. } = self;
-        let mut index = window.cut(index, width, 1);
-        let mut counts = vec![0u64; 256];
-        let blocks = index.as_chunks::<BLOCK>();
-        for block in blocks.0 {
-            if u128::from_ne_bytes(*block) == 0 {
-                counts[0] += BLOCK as u64;
-            } else {
-                block.iter().for_each(|&number| counts[usize::from(number)] += 1);
-            }
-        }
-        blocks.1.iter().for_each(|&number| counts[usize::from(number)] += 1);
-        let (palette, table) = Flat::ordered(&colours, &counts);
-        if table.iter().zip(0..).any(|(&to, from): (&u8, u8)| to != from) {
-            // Bare paper keeps its number.
-            debug_assert_eq!(table[0], WHITE);
-            for block in index.as_chunks_mut::<BLOCK>().0.iter_mut().filter(|b| u128::from_ne_bytes(**b) != 0)
-            {
-                block.iter_mut().for_each(|number| *number = table[usize::from(*number)]);
-            }
-            let rest = index.len() / BLOCK * BLOCK;
-            index[rest..].iter_mut().for_each(|number| *number = table[usize::from(*number)]);
-        }
-        Flat { colours: palette, index }
+    /// The colours in a window, which lies within the page, and the dots that have any; no colours if all are white.
+    pub fn colour(self, window: &Window) -> (Option<Colour>, Plane) {
+        let index = window.cut(self.index, self.width, 1);
+        let is_white = |number: u8| self.colours[usize::from(number)].1 == [255; 3];
+        let drawn = bitplane::from_bytes(window.width, &index, |number| !is_white(number));
+        (Colour::numbered(self.colours, index, window.width), drawn)
     }
 }

@@ -191,12 +191,6 @@ pub(super) fn difference(a: Light, b: Light) -> f64 {
     dot(way, way).sqrt()
 }
 
-/// The part of that distance that is not lightness.
-pub(super) fn difference_in_hue(a: Light, b: Light) -> f64 {
-    let [_, red, yellow] = minus(oklab(a), oklab(b));
-    red.hypot(yellow)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -52,6 +52,13 @@ impl ObjectType {
     }
 }
 
+/// What drew a pixel of three bytes, or of four with a tag before them, and its colour.
+#[inline(always)]
+pub(super) fn split<const N: usize>(pixel: &[u8; N]) -> (ObjectType, [u8; 3]) {
+    let kind = if N == BYTES { ObjectType::of(pixel[0]) } else { ObjectType::Picture };
+    (kind, [pixel[N - 3], pixel[N - 2], pixel[N - 1]])
+}
+
 /// Where Ghostscript writes the tag of a pixel. What is read here always has it first.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Order {

@@ -12,6 +12,7 @@ use inks::Stack;
 use protocol::ink::Ink;
 use rayon::prelude::*;
 
+use super::even::Even;
 use super::intent::{Hull, Intent, Light};
 use appearance::brdf::Space;
 use appearance::document::Materials;
@@ -94,6 +95,11 @@ impl Nodes {
         out.copy_from_slice(&sums.as_flattened()[..out.len()]);
     }
 
+    /// The weights of every node, padded with zeros.
+    pub fn weights(&self) -> impl Iterator<Item = &[u16]> {
+        self.lanes.chunks_exact(self.each).map(|lanes| lanes.as_flattened())
+    }
+
     fn of(&self, node: usize) -> &[[u16; 8]] {
         &self.lanes[node * self.each..][..self.each]
     }
@@ -103,6 +109,9 @@ impl Nodes {
 const NEAR: f64 = 4.0;
 /// The same for the lines from white, as a share of the distance from white.
 const NEAR_IN_HUE: f64 = 1.0 / 8.0;
+
+/// Up to so many nodes between its channels a colour is about grey.
+const GREY: usize = 1;
 
 /// What a colour is made of as tints: paper, a primary, and the secondary towards which its hue is turned.
 struct Tint {
@@ -114,18 +123,22 @@ struct Tint {
 
 impl Tint {
     /// The tint nearest to a node; `None` for greys.
-    fn of(node: [usize; 3], gamma: f64) -> Option<Tint> {
+    fn of(node: [usize; 3], amount: impl Fn(f64) -> f64) -> Option<Tint> {
         let mut order = [(node[0], 4), (node[1], 2), (node[2], 1)];
         order.sort_by_key(|&(level, _)| std::cmp::Reverse(level));
         let [most, middle, least] = order.map(|(level, _)| level as f64);
         if most == 0.0 || (most == least && order[0].0 < NODES - 1) {
             return None;
         }
-        let towards = if most > least { (middle - least) / (most - least) } else { 1.0 };
+        let towards = |[most, middle, least]: [f64; 3]| {
+            if most > least { (middle - least) / (most - least) } else { 1.0 }
+        };
+        let along = towards([most, middle, least]);
         let (dark, pale) = ((NODES - 1) as f64 - most, least);
-        let off_line = towards.min(1.0 - towards) / NEAR_IN_HUE;
+        let off_line = along.min(1.0 - along) / NEAR_IN_HUE;
         let part = (1.0 - dark / NEAR).max(0.0) * (1.0 - off_line.min(pale / NEAR)).max(0.0);
-        let (paper, second) = ((least / most).powf(1.0 / gamma), towards.powf(1.0 / gamma));
+        let amount = [most, middle, least].map(|level| amount(level / (NODES - 1) as f64));
+        let (paper, second) = (amount[2] / amount[0], towards(amount));
         let (primary, secondary) = (order[0].1, order[0].1 | order[1].1);
         let ink = 1.0 - paper;
         Some(Tint { parts: [(7, paper), (secondary, ink * second), (primary, ink * (1.0 - second))], part })
@@ -133,62 +146,87 @@ impl Tint {
 }
 
 /// Prints the edges of a lattice on which no fit is wanted: from white to each of the six primaries and from cyan, magenta and
-/// yellow to the red, green and blue beside them. Along them are the two stacks that the ends name, in shares that change
-/// evenly: 30 % cyan is cyan on 30 % of the dots, M 100 Y 50 is magenta, with yellow on half of its dots. Nodes near them are such tints in
-/// part, so that a shading that ends there has no step.
+/// yellow to the red, green and blue beside them. Along them are the two stacks that the ends name, in shares that change evenly with
+/// the `amount` of the values of red, green and blue. If that is the value itself, 30 % cyan is cyan on 30 % of the dots; if it is light, a
+/// pink with a fifth of green's and blue's light is paper on a fifth of its dots. Nodes near them are such tints in part, so that a
+/// shading that ends there has no step.
 pub(super) fn with_tints(
     mix: InkMix,
     lattice: usize,
-    gamma: f64,
+    amount: impl Fn(f64) -> f64,
     named: impl Fn([u8; 3]) -> Option<Stack>,
 ) -> Result<InkMix, WeightError> {
-    let InkMix { mut stacks, maps, mut matrix } = mix;
-    let old = maps.channels();
-    // The channel that is nothing but a stack.
-    let mut channel = |stack: &Stack| {
-        let number = stacks.iter().position(|known| known == stack).unwrap_or_else(|| {
-            stacks.push(stack.clone());
-            matrix.iter_mut().for_each(|shares| shares.push(0));
-            stacks.len() - 1
-        });
-        matrix.iter().position(|shares| shares[number] == ONE).unwrap_or_else(|| {
-            let mut shares = vec![0; stacks.len()];
-            shares[number] = ONE;
-            matrix.push(shares);
-            matrix.len() - 1
-        })
-    };
+    let mut wider = Wider::new(mix);
     // The corners without black: red, green and blue are a bit each.
     let corners: [Option<usize>; 8] = std::array::from_fn(|bits| {
         let colour = [4, 2, 1].map(|bit| if bits & bit > 0 { 255 } else { 0 });
-        (bits > 0).then(|| named(colour)).flatten().map(|stack| channel(&stack))
+        (bits > 0).then(|| named(colour)).flatten().map(|stack| wider.channel(&stack))
     });
-    let channels = matrix.len();
-    let mut data = vec![0; maps.data().len() / old * channels];
-    for (out, weights) in data.chunks_exact_mut(channels).zip(maps.data().chunks_exact(old)) {
-        out[..old].copy_from_slice(weights);
-    }
-    for node in 0..ALL {
-        let Some(Tint { parts, part }) =
-            Tint::of([node / (NODES * NODES), node / NODES % NODES, node % NODES], gamma)
-        else {
-            continue;
-        };
+    wider.changed(|node, out| {
+        let Some(node) = node.checked_sub(lattice * ALL).filter(|&node| node < ALL) else { return };
+        let at = [node / (NODES * NODES), node / NODES % NODES, node % NODES];
+        let Some(Tint { parts, part }) = Tint::of(at, &amount) else { return };
         let parts = parts.map(|(corner, share)| (corners[corner], share));
         if part == 0.0 || parts.iter().any(|&(corner, share)| corner.is_none() && share > 0.0) {
-            continue;
+            return;
         }
-        let out = &mut data[(lattice * ALL + node) * channels..][..channels];
-        let mut mixed: Vec<f64> = out.iter().map(|&weight| (1.0 - part) * f64::from(weight)).collect();
+        out.iter_mut().for_each(|weight| *weight *= 1.0 - part);
         for (corner, share) in parts {
             if let Some(corner) = corner {
-                mixed[corner] += part * share * f64::from(ONE);
+                out[corner] += part * share;
             }
         }
-        quantise(&mixed, out);
+    })
+}
+
+/// Mixtures with further channels, each of which is nothing but a stack.
+struct Wider {
+    stacks: Vec<Stack>,
+    maps: WeightMaps,
+    matrix: Vec<Vec<u16>>,
+}
+
+impl Wider {
+    fn new(InkMix { stacks, maps, matrix }: InkMix) -> Wider {
+        Wider { stacks, maps, matrix }
     }
-    let maps = WeightMaps::new(maps.width(), maps.height(), channels, data)?;
-    Ok(InkMix { stacks, maps, matrix })
+
+    /// The channel that is nothing but a stack.
+    fn channel(&mut self, stack: &Stack) -> usize {
+        let number = self.stacks.iter().position(|known| known == stack).unwrap_or_else(|| {
+            self.stacks.push(stack.clone());
+            self.matrix.iter_mut().for_each(|shares| shares.push(0));
+            self.stacks.len() - 1
+        });
+        self.matrix.iter().position(|shares| shares[number] == ONE).unwrap_or_else(|| {
+            let mut shares = vec![0; self.stacks.len()];
+            shares[number] = ONE;
+            self.matrix.push(shares);
+            self.matrix.len() - 1
+        })
+    }
+
+    /// The mixtures after `change` of those that it changes; it is told the number of each and its weights, which sum to 1.
+    fn changed(self, change: impl Fn(usize, &mut [f64])) -> Result<InkMix, WeightError> {
+        let Wider { stacks, maps, matrix } = self;
+        let (old, channels) = (maps.channels(), matrix.len());
+        let mut data = vec![0; maps.data().len() / old * channels];
+        let nodes = data.chunks_exact_mut(channels).zip(maps.data().chunks_exact(old));
+        for (node, (out, weights)) in nodes.enumerate() {
+            let mut wanted: Vec<f64> =
+                weights.iter().map(|&weight| f64::from(weight) / f64::from(ONE)).collect();
+            wanted.resize(channels, 0.0);
+            let before = wanted.clone();
+            change(node, &mut wanted);
+            out[..old].copy_from_slice(weights);
+            if wanted != before {
+                wanted.iter_mut().for_each(|weight| *weight *= f64::from(ONE));
+                quantise(&wanted, out);
+            }
+        }
+        let maps = WeightMaps::new(maps.width(), maps.height(), channels, data)?;
+        Ok(InkMix { stacks, maps, matrix })
+    }
 }
 
 /// The lattices as a document: one matte pixel for every node, in order of intent, red, green and blue.
@@ -196,7 +234,8 @@ pub(super) struct Lattice {
     space: Space,
     pub paper: Vec<f64>,
     black: Vec<f64>,
-    /// What is printed for each node, between black and paper.
+    /// What each stack looks like and what is printed for each node, between black and paper.
+    stacks: Vec<Light>,
     light: Vec<Light>,
 }
 
@@ -226,7 +265,8 @@ impl Lattice {
                 (row[from + c] - black[from + c]) / (paper[from + c] - black[from + c]).max(1e-9)
             })
         };
-        let hull = Hull::new(&printable.curves.rows().map(body).collect::<Vec<_>>());
+        let stacks: Vec<Light> = printable.curves.rows().map(body).collect();
+        let hull = Hull::new(&stacks);
         let level = |i: usize| (i as f64 / (NODES - 1) as f64).powf(1.0 / gamma);
         let level: [f64; NODES] =
             std::array::from_fn(|i| f64::from(appearance::srgb::decode(level(i) as f32)));
@@ -242,7 +282,25 @@ impl Lattice {
             nodes
         });
         let light = light.collect();
-        Lattice { space, paper, black, light }
+        Lattice { space, paper, black, stacks, light }
+    }
+
+    /// Makes the mixtures of the lattice number `lattice` those that are most even in lightness, of the stacks of `printable`. What is about grey stays as it is:
+    /// black and paper, whose hue no error of the printer changes.
+    pub fn even(&self, mix: InkMix, lattice: usize, printable: &Printable) -> Result<InkMix, WeightError> {
+        let even = Even::new(&self.stacks);
+        let mut wider = Wider::new(mix);
+        let channels: Vec<usize> = printable.stacks.iter().map(|stack| wider.channel(stack)).collect();
+        wider.changed(|node, out| {
+            let Some(node) = node.checked_sub(lattice * ALL).filter(|&node| node < ALL) else { return };
+            let [r, g, b] = [node / (NODES * NODES), node / NODES % NODES, node % NODES];
+            let is_grey = r.max(g).max(b) - r.min(g).min(b) <= GREY;
+            let shares = even.shares(self.light[lattice * ALL + node]).filter(|_| !is_grey);
+            if let Some(shares) = shares {
+                out.fill(0.0);
+                shares.into_iter().for_each(|(stack, share)| out[channels[stack]] += share);
+            }
+        })
     }
 }
 

@@ -18,64 +18,50 @@
 )]
 
 mod artwork;
-mod averages;
-mod beside;
 mod bitplane;
 mod cmyk;
 mod colour;
 mod compose;
-mod counters;
 mod coverage;
 mod decode;
 mod distance;
+mod edges;
 mod error;
-mod flat;
-mod grounds;
+mod even;
+mod fine;
+mod fit;
 mod indexed_page;
 mod intent;
-mod islands;
+mod key;
 pub mod kinds;
 mod lattice;
-mod lines;
-mod looks;
-mod main_colours;
-mod masks;
 pub mod names;
 mod open;
 mod options;
 mod order;
 mod orientation;
-mod outline;
 mod page;
-mod palette;
 pub mod pdf;
-mod pens;
 mod picture;
-mod pieces;
-mod posters;
+mod pixels;
 pub mod process;
 mod resample;
 mod reserved;
 mod scans;
-mod shapes;
 mod size;
-mod softened;
 mod solids;
-mod strokes;
 mod svg;
 mod svg_kinds;
 mod tiff;
 mod tiff_pages;
-mod translucent;
-mod treatments;
+mod tones;
 mod white;
 mod window;
-mod words;
 
 pub use artwork::{Artwork, Layer, Shape};
 pub use colour::Colour;
 pub use compose::{
-    Accept, Composed, Finish, GAMMAS, Laid, MOST_CHOKE_MM, Order, Remedy, Report, Settings, Suggestion,
+    Accept, Composed, Finish, GAMMAS, Laid, MOST_CHOKE_MM, Order, Remedy, Report, Settings, Suggestion, Text,
     compose,
 };
 pub use intent::Intent;

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::artwork::{Artwork, Layer};
 use super::coverage::{self, Scan};
-use super::error::{NamedPart, io, nothing, unknown_ink, wrong};
+use super::error::{NamedPart, io, no_dot, nothing, unknown_ink, wrong};
 use super::names::{self, stem};
 use super::options::{Options, Pages};
 use super::picture::Looks;
@@ -272,15 +272,6 @@ fn pages_of_inks(
     };
     let sources: Vec<Source> = (1..).zip(inks).map(source).collect();
     layers(&stem(file), &sources, None, options, observer)
-}
-
-/// An error about a page that has art, of which the ink that is named for it gets nothing.
-pub(super) fn no_dot(path: &Path, page: &str, ink: Ink) -> Diagnosis {
-    let problem = format!(
-        "{page} has art, but {} gets no dot of it: nothing on it is dark enough to be ink",
-        ink.name()
-    );
-    wrong(path, problem).hint("draw it in black, or in one colour on nothing")
 }
 
 /// Where a layer is.

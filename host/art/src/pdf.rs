@@ -20,9 +20,8 @@ use protocol::ink::Ink;
 
 use super::artwork::{Artwork, Layer};
 use super::coverage::Scan;
-use super::error::{io, nothing, several_pages, wrong};
+use super::error::{io, no_dot, nothing, several_pages, wrong};
 use super::names::{self, stem};
-use super::open::no_dot;
 use super::options::{Options, Pages};
 use super::picture;
 use super::size::{self, Unstated};
@@ -34,12 +33,9 @@ pub use complaint::{OLDER, cut_short, damaged, no_page};
 pub use ghostscript::{Interpreter, command, interpreter, order};
 pub use plates::{Separated, Survey, separated, survey};
 
-/// What the first bytes of an EPS file are that has a preview for DOS beside its PostScript, which Ghostscript finds.
-const EPS_WITH_PREVIEW: &[u8] = b"\xc5\xd0\xd3\xc6";
-
 /// Whether these are the first bytes of a document for [`read`].
 pub(super) fn is_document(start: &[u8]) -> bool {
-    start.starts_with(b"%PDF") || start.starts_with(b"%!") || start.starts_with(EPS_WITH_PREVIEW)
+    start.starts_with(b"%PDF") || start.starts_with(b"%!") || start.starts_with(eps::WITH_PREVIEW)
 }
 
 /// Reads a document.

@@ -4,7 +4,7 @@
 //! become layers if the options say so; whatever else is not white is colour.
 //! Cost: four bytes a pixel, and some nanoseconds. Limits: 8 bits a channel.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -63,6 +63,9 @@ pub(super) fn read(path: &Path, page: Option<u32>) -> Result<Pixels, Diagnosis> 
 const COLOURED: u8 = 48;
 /// Colours that differ by at most so much in red, green and blue are about one.
 const ALIKE: u8 = 24;
+
+/// The most colours of a picture that may be line art.
+const MOST_OF_LINE_ART: usize = 255;
 
 /// Darkness from and to which a pixel is neither nearly paper nor nearly ink.
 const TONES: std::ops::RangeInclusive<u8> = 48..=207;
@@ -232,12 +235,26 @@ pub(super) fn opaque_artwork<const N: usize>(
         let both = pixels.as_chunks_mut::<N>().0.iter_mut().zip(rgb.as_chunks::<3>().0);
         both.for_each(|(pixel, rgb)| pixel[N - 3..].copy_from_slice(rgb));
     }
-    let colour = Colour::of::<N>(pixels.as_chunks().0, size, dots);
     let finer = size.0 as usize > dots.0 || size.1 as usize > dots.1;
-    if finer && colour.as_ref().is_some_and(Colour::is_line_art) {
+    if finer && is_line_art(pixels.as_chunks::<N>().0) {
         notes.push(resample::note(file, format!("{} x {} pixels", size.0, size.1), dots, options));
     }
+    let colour = Colour::of_pixels::<N>(pixels, size);
     Artwork { layers, colour, drawn, notes, ..Artwork::blank(name, dots) }
+}
+
+/// Whether a picture has no more colours than a drawing, one of them not white.
+fn is_line_art<const N: usize>(pixels: &[[u8; N]]) -> bool {
+    let mut colours = HashSet::new();
+    let mut last = [255; 3];
+    pixels.iter().all(|pixel| {
+        let colour = [pixel[N - 3], pixel[N - 2], pixel[N - 1]];
+        if colour != last {
+            last = colour;
+            colours.insert(colour);
+        }
+        colours.len() <= MOST_OF_LINE_ART
+    }) && colours.iter().any(|colour| *colour != [255; 3])
 }
 
 /// The dots whose pixel of `N` bytes satisfies `is`.

@@ -97,7 +97,7 @@ fn at_dots(
 }
 
 /// The pixels of a dot along one side; at least one.
-fn pixels(dot: usize, from: usize, to: usize) -> Range<usize> {
+pub(super) fn pixels(dot: usize, from: usize, to: usize) -> Range<usize> {
     if from <= to {
         let at = (2 * dot + 1) * from / (2 * to);
         return at..at + 1;

@@ -9,8 +9,7 @@
 
 use rayon::prelude::*;
 
-use super::flat::split;
-use super::kinds::ObjectType;
+use super::kinds::{ObjectType, split};
 
 /// Paper with noise has at least so much in each of red, green and blue, and ink at most so much.
 const PAPER: u8 = 225;
@@ -101,6 +100,7 @@ pub(super) fn clean<const N: usize>(pixels: &mut [[u8; N]]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::super::colour::Colour;
+    use super::super::key::{BLACK, WHITE};
     use super::*;
     use image::codecs::jpeg::{JpegDecoder, JpegEncoder};
     use image::{ExtendedColorType, ImageDecoder};
@@ -141,38 +141,13 @@ mod tests {
         assert!(exact < pixels.len() * 3 / 4, "there is noise: {exact}");
         assert!(clean(&mut pixels));
         let size = (SIDE as u32, SIDE as u32);
-        let colour = Colour::of(&pixels, size, (SIDE, SIDE)).unwrap();
-        let black = colour.black.expect("black and white");
+        let colour = Colour::of_pixels::<3>(pixels.concat(), size).unwrap();
+        let keys = colour.keys((SIDE, SIDE));
         let wrong = (0..SIDE * SIDE)
             .filter(|&at| (covered(at) - 0.5).abs() > 0.25)
-            .filter(|&at| {
-                let bit = black.bits[at / SIDE * black.stride + at % SIDE / 8] >> (7 - at % SIDE % 8) & 1;
-                (bit == 1) != (covered(at) > 0.5)
-            })
+            .filter(|&at| keys[at] != if covered(at) > 0.5 { BLACK } else { WHITE })
             .count();
         assert_eq!(wrong, 0);
-    }
-
-    /// A page of 300 dpi drawn at 600, and one of 200.
-    #[test]
-    fn strokes_of_pages_that_were_enlarged_are_cut_too() {
-        let pixels = through_jpeg([0; 3], [255; 3]);
-        for times in [2, 3] {
-            let side = times * SIDE;
-            let mut large: Vec<[u8; 3]> =
-                (0..side * side).map(|at| pixels[at / side / times * SIDE + at % side / times]).collect();
-            assert!(clean(&mut large));
-            let colour = Colour::of(&large, (side as u32, side as u32), (side, side)).unwrap();
-            let black = colour.black.expect("black and white");
-            let wrong = (0..side * side)
-                .map(|at| (at, covered(at / side / times * SIDE + at % side / times)))
-                .filter(|(_, share)| (share - 0.5).abs() > 0.25)
-                .filter(|&(at, share)| {
-                    let bit = black.bits[at / side * black.stride + at % side / 8] >> (7 - at % side % 8) & 1;
-                    (bit == 1) != (share > 0.5)
-                });
-            assert_eq!(wrong.count(), 0, "{times} times");
-        }
     }
 
     /// A page of text with softened letters and a panel in a pale tint, as a browser draws it.

@@ -1,4 +1,4 @@
-//! Stacks as solid colours: which stack a flat colour names, and what a stack looks like beside what a colour asks for.
+//! Stacks as solid colours: which stack a flat colour names, and what a stack looks like.
 //!
 //! Problem: programs write the inks as the primaries of sRGB, none of which is printable in sRGB's sense.
 //! Method: a table of the eight corners of sRGB. What a stack reflects is read at the raking end of its curve, where there is no
@@ -7,10 +7,13 @@
 use inks::Stack;
 use protocol::ink::Ink;
 
-use super::intent::Light;
+use super::intent::{Light, difference};
 use super::lattice::ends;
 use appearance::brdf::Space;
 use appearance::gamut::Printable;
+
+/// How far from a colour its solid may be, in Oklab.
+const NEAR: f64 = 0.1;
 
 /// The stacks as solid colours.
 pub(super) struct Solids<'a> {
@@ -53,15 +56,19 @@ impl Solids<'_> {
         }
     }
 
+    /// The stack that looks most like a colour, if it is at most [`NEAR`] from it; never bare paper.
+    pub(super) fn nearest(&self, colour: [u8; 3]) -> Option<&Stack> {
+        let black = self.relative(self.black);
+        let light = colour.map(|v| f64::from(appearance::srgb::decode(f32::from(v) / 255.0)));
+        let wanted = std::array::from_fn(|c| black[c] + light[c] * (1.0 - black[c]));
+        let inked = (0..self.printable.stacks.len()).filter(|&at| at != self.bare);
+        let apart = inked.map(|at| (difference(self.relative(at), wanted), at));
+        let (_, at) = apart.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|nearest| nearest.0 <= NEAR)?;
+        Some(&self.printable.stacks[at])
+    }
+
     fn relative(&self, stack: usize) -> Light {
         let [row, paper] = [stack, self.bare].map(|stack| self.printable.curves.row(stack));
         std::array::from_fn(|c| row[row.len() - 3 + c] / paper[row.len() - 3 + c])
-    }
-
-    /// The light that a colour asks for, between black and paper.
-    pub(super) fn wanted(&self, colour: [u8; 3]) -> Light {
-        let black = self.relative(self.black);
-        let light = colour.map(|v| f64::from(appearance::srgb::decode(f32::from(v) / 255.0)));
-        std::array::from_fn(|c| black[c] + light[c] * (1.0 - black[c]))
     }
 }

@@ -9,10 +9,11 @@
 //! - [`Method::Walk`]: section 4.2 of the 2009 paper: error diffusion along the band walk of the document's rectangle
 //!   (`hilbert`).
 //! - [`Method::Blue`]: the diffusion of the cells on single dots, for process inks alone.
+//! - [`Method::Fine`]: each dot by itself from a table of small clusters (`fine`, [`green_noise`]), for process inks alone.
 //!
 //! Cost and memory: see each module; the map itself has one byte a dot. Limits: minimum clusters of 1 to [`LARGEST`] dots.
 //! Guarantees: every dot has a stack with weight in the document, or the one it is fixed to. No cluster of tones is smaller
-//! than its stack's minimum cluster, but for [`Method::Blue`] and where a whole region of tones is. The same input gives the same
+//! than its stack's minimum cluster, but for [`Method::Blue`], [`Method::Fine`] and where a whole region of tones is. The same input gives the same
 //! map on any machine with any number of threads.
 #![deny(unsafe_code)]
 #![allow(
@@ -28,6 +29,8 @@ mod axis;
 mod clustered;
 pub mod contrast_sensitivity;
 mod dbs;
+mod fine;
+pub mod green_noise;
 mod hilbert;
 pub mod metrics;
 mod solids;
@@ -62,6 +65,8 @@ pub enum Method {
     Best,
     /// Single dots scattered as evenly as error diffusion can; for process inks alone.
     Blue,
+    /// Small clusters that each dot picks by itself from a table; for process inks alone.
+    Fine,
 }
 
 /// A dot of the map of fixed dots that is halftoned.
@@ -168,7 +173,7 @@ pub enum HalftoneError {
     },
     /// Single dots of this stack would not hold.
     #[error(
-        "`{stack}` cannot be halftoned in single dots; only stacks of process inks can, so choose another halftone"
+        "`{stack}` cannot be halftoned in single dots or small clusters; only stacks of process inks can, so choose another halftone"
     )]
     NotProcess {
         /// The stack.
@@ -221,7 +226,7 @@ fn check(mix: &InkMix, (width, length): (u16, u16), settings: &Settings) -> Resu
             return Err(HalftoneError::Sum { row, sum });
         }
     }
-    if settings.method == Method::Blue {
+    if matches!(settings.method, Method::Blue | Method::Fine) {
         check_single_dots((0..stacks).filter(|&q| has_weight(mix, q)).map(|q| &mix.stacks[q]))?;
     }
     if settings.minimum.len() != stacks {
@@ -304,6 +309,7 @@ pub fn halftone(
         Method::Cells => cells(&settings.minimum, points().as_deref(), false),
         Method::Best => cells(&settings.minimum, points().as_deref(), true),
         Method::Blue => cells(&vec![1; mix.stacks.len()], None, false),
+        Method::Fine => fine::fine(mix, (width, length), settings, &solids, observer),
     };
     Ok(DotMap::new(width, length, mix.stacks.clone(), index)?)
 }

@@ -103,7 +103,7 @@ fn no_debt_crosses_a_solid() {
         });
         by(method, &mix, (400, 300), None, &[9; 3]).into_parts().1
     };
-    for method in [Method::Walk, Method::Cells, Method::Blue] {
+    for method in [Method::Walk, Method::Cells, Method::Blue, Method::Fine] {
         let (a, b) = (print(method, 0.2), print(method, 0.81));
         assert_ne!(a, b);
         for at in 0..a.len() {
@@ -121,19 +121,21 @@ fn no_debt_crosses_a_solid() {
 }
 
 #[test]
-fn single_dots_are_for_process_inks_alone() {
-    let mix = plain(1, 1, 6, |_, _| vec![0.5, 0.3, 0.2, 0.0, 0.0, 0.0]);
-    let dots = by(Method::Blue, &mix, (256, 256), None, &[9; 6]);
-    for (q, share) in [(0, 0.5), (1, 0.3), (2, 0.2)] {
-        let printed = dots.index().iter().filter(|&&dot| dot == q).count() as f64 / 65_536.0;
-        assert!((printed - share).abs() < 1e-3, "{q}: {printed}");
+fn single_dots_and_small_clusters_are_for_process_inks_alone() {
+    for method in [Method::Blue, Method::Fine] {
+        let mix = plain(1, 1, 6, |_, _| vec![0.5, 0.3, 0.2, 0.0, 0.0, 0.0]);
+        let dots = by(method, &mix, (256, 256), None, &[9; 6]);
+        for (q, share) in [(0, 0.5), (1, 0.3), (2, 0.2)] {
+            let printed = dots.index().iter().filter(|&&dot| dot == q).count() as f64 / 65_536.0;
+            assert!((printed - share).abs() < 1e-3, "{method:?}, {q}: {printed}");
+        }
+        let foil = mix.stacks.iter().position(|stack| !is_process(stack)).unwrap();
+        let mut mixed = mix.clone();
+        mixed.matrix[1].swap(1, foil);
+        let settings = Settings { method, ..Settings::uniform(6, 9) };
+        let said = halftone(&mixed, (9, 9), None, &settings, &Silent).unwrap_err();
+        assert_eq!(said, HalftoneError::NotProcess { stack: mix.stacks[foil].clone() });
     }
-    let foil = mix.stacks.iter().position(|stack| !is_process(stack)).unwrap();
-    let mut mixed = mix.clone();
-    mixed.matrix[1].swap(1, foil);
-    let settings = Settings { method: Method::Blue, ..Settings::uniform(6, 9) };
-    let said = halftone(&mixed, (9, 9), None, &settings, &Silent).unwrap_err();
-    assert_eq!(said, HalftoneError::NotProcess { stack: mix.stacks[foil].clone() });
 }
 
 proptest! {

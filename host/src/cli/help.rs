@@ -40,7 +40,7 @@ const GROUPS: &[(&str, &[&str])] = &[
     ("Layers of ink", &["order", "passes", "knockout", "white", "choke", "spread", "finish"]),
     (
         "Inks and materials",
-        &["inks", "library", "trust", "bases", "factor", "seed", "intent", "metric", "halftone"],
+        &["inks", "library", "trust", "bases", "factor", "seed", "intent", "metric", "halftone", "text"],
     ),
     ("Edits", &["glossier", "albedo", "mix", "steps"]),
     ("Display", &["cell", "transmission", "shift"]),

@@ -131,7 +131,8 @@ const FINISH: [(&str, &str, Finish); 3] = [
 const QUALITY: [(&str, &str, u16); 2] =
     [("Normal", "Normal (600 dpi)", 600), ("Draft", "Draft (rendered at 300 dpi)", 300)];
 
-const HALFTONE: [(&str, &str, Method); 3] = [
+const HALFTONE: [(&str, &str, Method); 4] = [
+    ("Fine", "Small clusters, dot by dot", Method::Fine),
     ("Cells", "Compact clusters", Method::Cells),
     ("Best", "Compact clusters, searched (slower)", Method::Best),
     ("Walk", "Runs along a curve", Method::Walk),

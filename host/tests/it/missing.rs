@@ -173,3 +173,41 @@ fn a_document_with_many_spot_colours_keeps_its_layers_of_ink() {
         assert!(has(&passes, "metallic-gold", 36.0), "{passes:?}, {said}");
     }
 }
+
+/// Ghostscript lost the white plate of small pages, and its 10 % of grey was screened over the page.
+#[test]
+fn a_small_page_keeps_its_spots_where_something_is_transparent() {
+    if !ghostscript() {
+        return;
+    }
+    let resources = "/ExtGState << /s << /ca .5 >> >> /ColorSpace << /W [/Separation /White /DeviceCMYK \
+        << /FunctionType 2 /Domain [0 1] /C0 [0 0 0 0] /C1 [0 0 0 .1] /N 1 >>] >>";
+    let page = document(resources, "/W cs 1 scn 0 0 200 100 re f /s gs 0 1 1 0 k 70 20 60 60 re f");
+    let page = String::from_utf8(page).unwrap().replace("[0 0 288 432] /Contents", "[0 0 200 100] /Contents");
+    let bench = Bench::new();
+    fs::write(bench.path("page.pdf"), page).unwrap();
+    bench.done("layers page.pdf --at 10x15mm -o page.print");
+    let passes = passes(&fs::read(bench.path("page.print/job.rgl")).unwrap());
+    // Half of the white shows through the square, which is half of itself.
+    let (all, square) = (200.0 * 100.0 * (600.0f64 / 72.0).powi(2), (60.0f64 * 600.0 / 72.0).powi(2));
+    for (ink, wanted) in [("white", all - square / 2.0), ("magenta", square / 2.0), ("yellow", square / 2.0)]
+    {
+        let dots = passes.iter().find(|(found, _)| found == ink).map_or(0.0, |(_, dots)| *dots as f64);
+        assert!((dots / wanted - 1.0).abs() < 0.03, "{ink}: {dots}, not {wanted}: {passes:?}");
+    }
+    assert_eq!(passes.len(), 3, "{passes:?}");
+}
+
+/// By one road it had tones, by the other it was exact.
+#[test]
+fn a_picture_that_asks_to_be_smooth_has_the_dots_of_its_pixels_by_both_roads() {
+    if !ghostscript() {
+        return;
+    }
+    let picture = "q 96 0 0 96 72 72 cm BI /W 8 /H 8 /CS /G /BPC 1 /I true /F /AHx ID aa55aa55aa55aa55> EI Q";
+    for (passes, said) in both(&document("", picture), None) {
+        let [(ink, dots)] = &passes[..] else { panic!("{passes:?}, {said}") };
+        assert_eq!(ink, "black");
+        assert!((*dots as f64 / (96.0f64 * 600.0 / 72.0).powi(2) - 0.5).abs() < 0.01, "{dots}");
+    }
+}

@@ -22,6 +22,17 @@ pub enum Finish {
     None,
 }
 
+/// How text in colours that no stack prints becomes dots.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Text {
+    /// Like everything else in its colour.
+    #[default]
+    Mixed,
+    /// In the nearest solid, if one looks about like its colour: for labels.
+    Solid,
+}
+
 /// The exponents by which pictures may be brightened.
 pub const GAMMAS: std::ops::RangeInclusive<f64> = 0.2..=5.0;
 
@@ -48,6 +59,8 @@ pub struct Settings {
     pub gamma: f64,
     /// How tones become dots.
     pub halftone: Method,
+    /// How text becomes dots.
+    pub text: Text,
     /// The suggestions to follow.
     pub accept: Vec<Accept>,
 }
@@ -65,7 +78,8 @@ impl Default for Settings {
             finish: None,
             intent: Intent::Auto,
             gamma: 1.0,
-            halftone: Method::default(),
+            halftone: Method::Fine,
+            text: Text::Mixed,
             accept: Vec::new(),
         }
     }

@@ -231,7 +231,7 @@ fn colours_keep_off_the_dots_of_reserved_inks_and_white_paper_stays_bare() {
     let mut art = Artwork::blank("picture", (width, length));
     // Left third white, the others dark red; gold on the last.
     let rgb = (0..width * length).flat_map(|dot| if dot % width < 32 { [255; 3] } else { [120, 20, 30] });
-    art.colour = Some(Colour { width, height: length, rgb: rgb.collect(), ..Colour::default() });
+    art.colour = Colour::of_pixels::<3>(rgb.collect(), (width as u32, length as u32));
     let gold: Vec<u8> = (0..width * length).map(|dot| u8::from(dot % width >= 64)).collect();
     let shape = Shape::Solid(bitplane::from_bytes(width, &gold, |byte| byte == 1));
     art.layers.push(Layer { ink: MetallicGold, name: "gold".into(), place: None, shape });

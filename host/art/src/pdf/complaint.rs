@@ -8,10 +8,8 @@
 //! Limits: the sentences are those of versions 9.5 to 10; what other versions say in other words is not noticed.
 
 use std::fs::File;
-use std::io::{Read as _, Seek as _, SeekFrom};
+use std::io::{self, Read as _, Seek as _, SeekFrom};
 use std::path::Path;
-
-use super::ghostscript::is_pdf;
 
 /// How far from its end a document says where the table of its objects is: readers look in the last 1024 bytes, and forgive some
 /// more.
@@ -199,6 +197,16 @@ fn is_cut_short(path: &Path) -> bool {
         Ok::<_, std::io::Error>(end)
     };
     is_pdf(path).unwrap_or(false) && ends().is_ok_and(|end| !end.windows(9).any(|word| word == b"startxref"))
+}
+
+/// Whether a document is PDF.
+///
+/// # Errors
+/// Those of opening it.
+pub(super) fn is_pdf(path: &Path) -> io::Result<bool> {
+    let mut start = [0; 4];
+    let mut file = File::open(path)?;
+    Ok(file.read_exact(&mut start).is_ok() && &start == b"%PDF")
 }
 
 #[cfg(test)]

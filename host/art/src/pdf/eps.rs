@@ -9,8 +9,8 @@ use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
-use super::EPS_WITH_PREVIEW;
-
+/// What the first bytes of an EPS file are that has a preview for DOS beside its PostScript, which Ghostscript finds.
+pub(super) const WITH_PREVIEW: &[u8] = b"\xc5\xd0\xd3\xc6";
 /// How far from the beginning the comments of the header are looked for, and those of the trailer from the end.
 const HEADER: u64 = 1 << 14;
 const TRAILER: u64 = 1 << 16;
@@ -34,7 +34,7 @@ pub(super) fn bounds(path: &Path) -> io::Result<Option<Bounds>> {
     let mut file = File::open(path)?;
     let mut start = Vec::new();
     (&mut file).take(HEADER).read_to_end(&mut start)?;
-    if start.starts_with(EPS_WITH_PREVIEW)
+    if start.starts_with(WITH_PREVIEW)
         && let Some(place) = start.get(4..).and_then(|rest| rest.first_chunk())
     {
         file.seek(SeekFrom::Start(u32::from_le_bytes(*place).into()))?;

@@ -11,8 +11,7 @@
 //! corners of a shading first, so narrow stripes may become one colour; a note says so.
 
 use std::ffi::OsStr;
-use std::fs::File;
-use std::io::{self, Read as _};
+use std::io::Read as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -30,18 +29,12 @@ const SPEAKS: &str = "userdict /QUIET false put";
 /// Copies are the print system's affair, and since 10.04 each copy of a page with tags has its bytes in another order. PostScript asks for copies in
 /// two ways.
 const ONE_COPY: &str = "-dNumCopies=1";
+/// A page that fits into memory loses its spot plates where something is transparent; in bands it keeps them.
+const ALL_PLATES: &str = "-dMaxBitmap=0";
+/// Pictures are drawn pixel by pixel, whatever the document asks for: interpolated, art in one bit has tones.
+const AS_THEY_ARE: &str = "-dNOINTERPOLATE";
 const NO_COPIES: &str = "userdict begin /setpagedevice { dup /NumCopies known { dup length dict copy dup /NumCopies undef } if \
     systemdict /setpagedevice get exec } bind def end";
-
-/// Whether a document is PDF.
-///
-/// # Errors
-/// Those of opening it.
-pub(super) fn is_pdf(path: &Path) -> io::Result<bool> {
-    let mut start = [0; 4];
-    let mut file = File::open(path)?;
-    Ok(file.read_exact(&mut start).is_ok() && &start == b"%PDF")
-}
 
 /// Ghostscript's interpreter of PDF.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -66,7 +59,16 @@ pub fn command<O: AsRef<OsStr>>(
     command
         .current_dir(folder)
         .env("TMPDIR", folder)
-        .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-sstdout=%stderr", ONE_COPY])
+        .args([
+            "-q",
+            "-dSAFER",
+            "-dBATCH",
+            "-dNOPAUSE",
+            "-sstdout=%stderr",
+            ONE_COPY,
+            ALL_PLATES,
+            AS_THEY_ARE,
+        ])
         .arg(format!("-dBufferSpace={BANDS}"));
     if interpreter == Interpreter::Older {
         command.arg("-dNEWPDF=false");
@@ -74,7 +76,7 @@ pub fn command<O: AsRef<OsStr>>(
     // What the options run needs the device.
     command.args(options);
     // What warns of a box in EPS does not work when it may speak.
-    let first = if is_pdf(path).unwrap_or(false) { SPEAKS } else { NO_COPIES };
+    let first = if complaint::is_pdf(path).unwrap_or(false) { SPEAKS } else { NO_COPIES };
     command.args(["-c", first, "-f"]);
     command.arg(std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()));
     command

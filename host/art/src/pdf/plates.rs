@@ -7,7 +7,7 @@
 //! full tint. So a colour of several spots keeps each part. A name that resembles that of an ink is an error, because a
 //! slip would cost ribbon. The layers of art and the print queues use the same two functions, [`survey`] and [`separated`].
 //! If a process plate has tones, the page is drawn once more with the kind of each pixel, and what lies beside the layers is
-//! treated like any page: letters keep their outline. On dots of layers the process plates say what overprints.
+//! treated like any page: what drew a pixel decides how its colour is mixed. On dots of layers the process plates say what overprints.
 //! Cost: seconds a page, twice if it has tones. Limits: where a spot overprints, tints between none and full are taken as
 //! proportional.
 
@@ -25,6 +25,7 @@ use super::super::options::Options;
 use super::super::size;
 use super::super::window::Window;
 use super::super::{kinds, picture};
+use super::conversion;
 use super::draw::{PROCESS, Part, Tagged, drafts, plates_beside, separate, tagged};
 use super::ghostscript::Interpreter;
 use files::scratch::Scratch;
@@ -184,13 +185,16 @@ fn overprint(pixels: &mut [u8], layers: &[(String, Named, Vec<u8>)], process: &[
     const ROWS: usize = 1 << 16;
     let of = |name: &str| process.iter().find(|(plate, _)| plate == name).map(|(_, coverage)| &coverage[..]);
     let inks = PROCESS.map(of);
+    // As what is drawn beside the layers is converted.
+    let taken: [u8; 256] =
+        std::array::from_fn(|ink| (255.0 * conversion::taken(ink as f64 / 255.0)).round() as u8);
+    let taken = |ink: u8| taken[usize::from(ink)];
     pixels.par_chunks_mut(kinds::BYTES * ROWS).enumerate().for_each(|(block, pixels)| {
         for (at, pixel) in (block * ROWS..).zip(pixels.as_chunks_mut::<{ kinds::BYTES }>().0) {
             if layers.iter().any(|(.., coverage)| coverage[at] > 0) {
                 let [c, m, y, k] = inks.map(|ink| ink.map_or(0, |coverage| coverage[at]));
                 let [_, rgb @ ..] = pixel;
-                // As what is drawn beside the layers is converted ([`conversion`](super::conversion)).
-                *rgb = [c, m, y].map(|ink| 255 - ink.saturating_add(k));
+                *rgb = [c, m, y].map(|ink| 255 - taken(ink).saturating_add(taken(k)));
             }
         }
     });

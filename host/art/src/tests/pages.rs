@@ -176,13 +176,12 @@ fn spots_without_an_ink_print_by_their_process_colours_in_layers_and_queue_alike
     let art = read(std::slice::from_ref(&file), &Options::default());
     let [(Ink::White, white)] = amounts(&art)[..] else { panic!("{:?}", art.layers) };
     assert!((white / (800.0 * 250.0) - 1.0).abs() < 0.03, "{white}");
-    // In pixels of 300 dpi: the line, half of it on white, and white alone. Half of an ink is half of a value in sRGB, which is printed on
-    // half of the dots.
-    let colour = art.colour.as_ref().unwrap().averages((art.width, art.length), None);
+    // The line, half of it on white, and white alone. Half of an ink takes half of the light: 188 of 255.
+    let keys = art.colour.as_ref().unwrap().keys((art.width, art.length));
     for ((x, y), wanted) in
-        [((250, 237), [255, 0, 127]), ((175, 125), [255, 127, 191]), ((350, 125), [255; 3])]
+        [((500, 474), [255, 0, 188]), ((350, 250), [255, 188, 225]), ((700, 250), [255; 3])]
     {
-        let found = &colour.rgb[3 * (y * colour.width + x)..][..3];
+        let found = key::colour(keys[y * art.width + x]);
         assert!(found.iter().zip(wanted).all(|(v, w)| v.abs_diff(w) <= 3), "at {x}, {y}: {found:?}");
     }
     let note = "spot colour `Dieline` names no ink: printed by its process colours";
@@ -192,7 +191,8 @@ fn spots_without_an_ink_print_by_their_process_colours_in_layers_and_queue_alike
     let page = pdf::separated(&file, Interpreter::Usual, 1, 600.0).unwrap();
     let window = Window { left: 0, top: 0, width: page.size.0, height: page.size.1 };
     let queued = page.art("page", &window, &Options::default()).unwrap();
-    assert_eq!((amounts(&queued), &queued.colour), (amounts(&art), &art.colour));
+    let keys = |art: &Artwork| art.colour.as_ref().map(|colour| colour.keys((art.width, art.length)));
+    assert_eq!((amounts(&queued), keys(&queued)), (amounts(&art), keys(&art)));
     // A slip is an error in both.
     let slip = bench.write("slip.ps", MIXED.replace("Dieline", "Golld"));
     for error in [

@@ -109,7 +109,7 @@ pub fn ramp(
     sketch.text_to(width, 0, LABEL, &pen, &b.to_string());
     let shares: Vec<f64> = (0..STEPS).map(|i| 1.0 - (i as f64 + 0.5) / STEPS as f64).collect();
     let place = |area: &Area| (area.left, area.top, area.width, area.length);
-    sketch.halftone(place(&parts.ramp), [a, b], &shares, method, library, observer)?;
+    sketch.halftone(place(&parts.ramp), [a, b], &shares, method.into(), library, observer)?;
     let foot = parts.ramp.top + parts.ramp.length + mm(1.0);
     for tenth in 0..=10 {
         let x = (width - 6) * tenth / 10;

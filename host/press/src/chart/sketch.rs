@@ -2,12 +2,13 @@
 
 use std::convert::Infallible;
 
-use embedded_graphics::mono_font::MonoTextStyle;
-use embedded_graphics::mono_font::ascii::FONT_10X20;
+use embedded_graphics::mono_font::ascii::{FONT_9X18, FONT_10X20};
+use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
 use embedded_graphics::pixelcolor::BinaryColor;
 use embedded_graphics::prelude::{DrawTarget, Drawable, OriginDimensions, Pixel, Point, Size};
 use embedded_graphics::text::{Baseline, Text};
 use inks::{Library, Stack};
+use protocol::ink::Ink;
 
 use super::error::ChartError;
 use crate::layout::Mm;
@@ -26,6 +27,22 @@ pub(super) const LINE: usize = 20;
 pub(super) fn mm(length: f64) -> usize {
     Mm(length).dots().max(0) as usize
 }
+
+/// How a patch is halftoned: with the minimum clusters of the library, or with this one for all stacks.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Screen {
+    pub method: Method,
+    pub minimum: Option<u16>,
+}
+
+impl From<Method> for Screen {
+    fn from(method: Method) -> Screen {
+        Screen { method, minimum: None }
+    }
+}
+
+/// Scale of letters 18 dots high whose capitals are as high as those of 6 points, 36 dots.
+const SIX_POINTS: usize = 3;
 
 /// A rectangle: x, y, width, length in dots.
 pub(super) type Place = (usize, usize, usize, usize);
@@ -75,9 +92,19 @@ impl Sketch {
 
     /// Writes a line of letters with its top left corner at (x, y), each dot of them `scale` dots wide.
     pub(super) fn text(&mut self, x: usize, y: usize, scale: usize, stack: &Stack, text: &str) {
+        self.letters((x, y), (&FONT_10X20, scale), stack, text);
+    }
+
+    fn letters(
+        &mut self,
+        (x, y): (usize, usize),
+        (font, scale): (&MonoFont<'_>, usize),
+        stack: &Stack,
+        text: &str,
+    ) {
         let number = self.number(stack);
         let mut pen = Pen { sketch: self, x, y, scale, number };
-        let style = MonoTextStyle::new(&FONT_10X20, BinaryColor::On);
+        let style = MonoTextStyle::new(font, BinaryColor::On);
         let Ok(_) = Text::with_baseline(text, Point::zero(), style, Baseline::Top).draw(&mut pen);
     }
 
@@ -90,12 +117,41 @@ impl Sketch {
     /// from left to right.
     pub(super) fn halftone(
         &mut self,
+        place: Place,
+        stacks: [&Stack; 2],
+        share: &[f64],
+        screen: Screen,
+        library: &Library,
+        observer: &dyn Observer,
+    ) -> Result<(), ChartError> {
+        self.screened(place, stacks, share, screen, |_, _| true, (library, observer))
+    }
+
+    /// Writes lines of 6-point letters, as high as they are in ordinary print, in a halftone of two stacks.
+    pub(super) fn halftoned_text(
+        &mut self,
+        place: Place,
+        stacks: [&Stack; 2],
+        share: f64,
+        screen: Screen,
+        lines: &str,
+        work: (&Library, &dyn Observer),
+    ) -> Result<(), ChartError> {
+        let (_, _, width, length) = place;
+        let mut mask = Sketch::new(width, length);
+        mask.letters((0, 0), (&FONT_9X18, SIX_POINTS), &Stack::new([Ink::Black]), lines);
+        let is_letter = |x: usize, y: usize| mask.index[y * width + x] > 0;
+        self.screened(place, stacks, &[share], screen, is_letter, work)
+    }
+
+    fn screened(
+        &mut self,
         (x, y, width, length): Place,
         [a, b]: [&Stack; 2],
         share: &[f64],
-        method: Method,
-        library: &Library,
-        observer: &dyn Observer,
+        Screen { method, minimum }: Screen,
+        is_part: impl Fn(usize, usize) -> bool,
+        (library, observer): (&Library, &dyn Observer),
     ) -> Result<(), ChartError> {
         let mut stacks = vec![Stack::SUBSTRATE];
         let mut row_of = |stack: &Stack| {
@@ -116,12 +172,15 @@ impl Sketch {
         let (wide, long) = (width as u16, length as u16);
         let maps = WeightMaps::new(share.len(), 1, 2, weights)?;
         let mix = InkMix { stacks, maps, matrix };
-        let settings =
+        let mut settings =
             halftone::Settings { method, ..halftone::Settings::from_library(&mix.stacks, library) };
+        if let Some(minimum) = minimum {
+            settings.minimum.fill(minimum);
+        }
         let patch = halftone(&mix, (wide, long), None, &settings, observer)?;
         let numbers: Vec<u8> = mix.stacks.iter().map(|stack| self.number(stack)).collect();
         for (row, dots) in patch.index().chunks_exact(width).enumerate() {
-            for (column, &dot) in dots.iter().enumerate() {
+            for (column, &dot) in dots.iter().enumerate().filter(|&(column, _)| is_part(column, row)) {
                 self.put(x + column, y + row, numbers[usize::from(dot)]);
             }
         }

@@ -87,7 +87,7 @@ pub fn ladder(
         for (column, gloss) in GLOSS.into_iter().enumerate() {
             let place = (column * step, top + line + mm(1.0), patch, patch);
             let share = ladder_shares(gloss)[row];
-            sketch.halftone(place, [glossy, dull], &[share], method, library, observer)?;
+            sketch.halftone(place, [glossy, dull], &[share], method.into(), library, observer)?;
             let label = format!("{:.0} %", 100.0 * gloss);
             sketch.text(place.0, place.1 + patch + mm(1.0), LABEL, &pen, &label);
         }

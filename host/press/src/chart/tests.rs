@@ -231,14 +231,22 @@ fn charts_refuse_what_shows_nothing() {
 fn the_halftones_have_the_same_tones() {
     let print = |a: &str, b: &str| halftones(&stack(a), &stack(b), &Library::builtin(), &Silent).unwrap();
     let chart = print("K", "substrate");
-    let (patch, column, row) = ((945, 354), 945 + 94, 80 + 24 + 354 + 47);
-    assert_eq!(chart.width(), 4 * column - 94);
-    for method in 0..4 {
-        for (j, want) in [0.5, 0.02, 0.1, 0.3, 0.5].into_iter().enumerate() {
-            let place = (method * column, 80 + 47 + j * row + 80 + 24, patch.0, patch.1);
+    let (patch, column, row) = ((709, 236), 709 + 47, 60 + 24 + 236 + 47);
+    assert_eq!(chart.width(), 6 * column - 47);
+    for screen in 0..6 {
+        for (j, want) in [0.5, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9].into_iter().enumerate() {
+            let place = (screen * column, 80 + 47 + j * row + 60 + 24, patch.0, patch.1);
             let share = count(&chart, place, "K") as f64 / (patch.0 * patch.1) as f64;
-            assert!((share - want).abs() < 0.003, "method {method}, patch {j}: {share} {want}");
+            assert!((share - want).abs() < 0.004, "screen {screen}, patch {j}: {share} {want}");
+        }
+        // Text has the share of its tone on as many dots in every column.
+        let ink = |j: usize| {
+            let place = (screen * column, 80 + 47 + (9 + j) * row + 60 + 24, patch.0, patch.1);
+            count(&chart, place, "K") as f64
+        };
+        for (j, want) in [0.2, 0.5].into_iter().enumerate() {
+            assert!((ink(j) / ink(2) * 0.8 / want - 1.0).abs() < 0.1, "screen {screen}, text {j}");
         }
     }
-    assert_eq!(print("SF", "MS").width(), 3 * column - 94);
+    assert_eq!(print("SF", "MS").width(), 3 * column - 47);
 }

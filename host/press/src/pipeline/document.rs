@@ -86,7 +86,7 @@ pub fn halftoned(
     layout: &Layout,
     observer: &dyn Observer,
 ) -> Result<Halftoned, StageError> {
-    if settings.halftone == halftone::Method::Blue {
+    if matches!(settings.halftone, halftone::Method::Blue | halftone::Method::Fine) {
         let entries = library.at_hand(&settings.inks);
         halftone::check_single_dots(entries.into_iter().map(|entry| &entry.stack))?;
     }
@@ -189,7 +189,7 @@ fn cells(
     let entries = library.at_hand(&settings.inks);
     let least = entries.into_iter().map(|entry| library.minimum_cluster(&entry.stack)).min().unwrap_or(1);
     let side = match settings.halftone {
-        halftone::Method::Blue => 1,
+        halftone::Method::Blue | halftone::Method::Fine => 1,
         _ => (1..).find(|side| side * side >= usize::from(least)).unwrap_or(1),
     };
     resolution(pixels, (usize::from(width).div_ceil(side), usize::from(height).div_ceil(side)))

@@ -140,6 +140,11 @@ impl Choice for halftone::Method {
         (halftone::Method::Cells, "cells", "Compact clusters, no part thinner than its ink holds"),
         (halftone::Method::Best, "best", "Cells, rearranged to lessen the error the eye sees; slower"),
         (halftone::Method::Blue, "blue", "Single scattered dots (blue noise); for process inks alone"),
+        (
+            halftone::Method::Fine,
+            "fine",
+            "Small clusters that each dot picks from a table; for process inks alone",
+        ),
     ];
 }
 
@@ -171,6 +176,13 @@ impl Choice for White {
         (White::Opaque, "opaque", "Where the picture is neither pure white nor transparent"),
         (White::Silhouette, "silhouette", "Everything inside the outline, including holes and white areas"),
         (White::Alpha, "alpha", "Where the picture is not transparent, including pure white"),
+    ];
+}
+
+impl Choice for art::Text {
+    const ALL: &'static [(art::Text, &'static str, &'static str)] = &[
+        (art::Text::Mixed, "mixed", "In its colour, mixed dot by dot like everything else"),
+        (art::Text::Solid, "solid", "In the nearest solid, if one looks about like its colour: for labels"),
     ];
 }
 

@@ -82,7 +82,7 @@ impl DotsArgs {
             factor: self.factor.settings(),
             gamut: self.gamut.settings(self.factor.seed),
             inks,
-            halftone: self.halftone.halftone,
+            halftone: self.halftone.halftone.unwrap_or_default(),
             size: self.size,
         };
         let halftoned = document::halftoned(&document, &library, &settings, &layout, observer)?;

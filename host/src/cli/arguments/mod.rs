@@ -163,8 +163,9 @@ impl InkArgs {
 #[derive(Args, Debug)]
 pub struct HalftoneArg {
     /// How the stack of each dot is chosen where the art has tones; solid dots are printed as they are
-    #[arg(long, value_name = "METHOD", default_value = "cells", value_parser = choice::<halftone::Method>())]
-    pub halftone: halftone::Method,
+    /// [default: fine for the process inks of flat art, else cells]
+    #[arg(long, value_name = "METHOD", value_parser = choice::<halftone::Method>())]
+    pub halftone: Option<halftone::Method>,
 }
 
 /// How to map materials to the inks.

@@ -40,7 +40,7 @@ enum Chart {
     Ramp(Ramp),
     /// Print four levels of gloss between a glossy and a dull stack, both clamped and with their differences kept
     Ladder(Ladder),
-    /// Print a ramp and flat patches by each halftone side by side, to see how they differ
+    /// Print a ramp, flat patches and small text by each halftone side by side, to see which the printer holds
     Halftone(Halftone),
     /// Print a labelled patch of every stack that the chosen inks can make
     Stacks(Stacks),
@@ -150,11 +150,15 @@ const USUAL: &str = "process,metallic-silver,metallic-gold,finish";
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     match &args.chart {
         Chart::Ramp(Ramp { first, second, halftone, step }) => {
-            let make = |library: &Library| chart::ramp(first, second, halftone.halftone, library, observer);
+            let make = |library: &Library| {
+                chart::ramp(first, second, halftone.halftone.unwrap_or_default(), library, observer)
+            };
             step.run("ramp", chart::ramp::parts().size, make, [first, second], observer)
         }
         Chart::Ladder(Ladder { glossy, dull, halftone, step }) => {
-            let make = |library: &Library| chart::ladder(glossy, dull, halftone.halftone, library, observer);
+            let make = |library: &Library| {
+                chart::ladder(glossy, dull, halftone.halftone.unwrap_or_default(), library, observer)
+            };
             step.run("ladder", chart::size_of_ladder(), make, [glossy, dull], observer)
         }
         Chart::Halftone(Halftone { first, second, step }) => {

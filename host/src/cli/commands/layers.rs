@@ -56,6 +56,9 @@ pub struct LayersArgs {
     pub tones: Option<String>,
     #[command(flatten)]
     pub halftone: HalftoneArg,
+    /// How text in colours between the inks is printed
+    #[arg(long, value_name = "HOW", value_parser = choice::<art::Text>(), default_value = "mixed")]
+    pub text: art::Text,
     /// Inks that may be used: names and the groups process, metallic, clear, foil, all, separated by commas; + and -
     /// change the default [default: all but the foils]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
@@ -216,7 +219,8 @@ impl LayersArgs {
             finish: self.finish,
             intent: self.intent,
             gamma: self.gamma,
-            halftone: self.halftone.halftone,
+            halftone: self.halftone.halftone.unwrap_or(art::Settings::default().halftone),
+            text: self.text,
             accept: self.accept.clone(),
         })
     }
@@ -249,6 +253,9 @@ impl LayersArgs {
             }
             if settings.intent != art::Settings::default().intent {
                 plain("--intent");
+            }
+            if settings.text != art::Settings::default().text {
+                plain("--text");
             }
         }
         notes

@@ -160,7 +160,7 @@ impl Halftone {
         let size = layout::size::dots(pixels, provenance.size_mm, self.size, &any)?;
         let staged = Staged::folder(&named(&self.output, &self.mix, "dots"), Kind::Dots)?;
         let settings = halftone::Settings {
-            method: self.halftone.halftone,
+            method: self.halftone.halftone.unwrap_or_default(),
             ..halftone::Settings::from_library(&mix.stacks, &library)
         };
         let dots = halftone::halftone(&mix, size, None, &settings, observer)?;

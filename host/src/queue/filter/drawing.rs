@@ -40,12 +40,8 @@ impl Drawing {
     ) -> Result<Drawing, FilterError> {
         let scratch = Scratch::new().map_err(io_error("make a temporary folder"))?;
         conversion::write(scratch.path()).map_err(io_error("keep the conversion of colours"))?;
-        let options = [
-            "-dNOINTERPOLATE".into(),
-            format!("-sDEVICE={}", kinds::DEVICE),
-            format!("-r{dpi}"),
-            "-sOutputFile=%stdout".into(),
-        ];
+        let options =
+            [format!("-sDEVICE={}", kinds::DEVICE), format!("-r{dpi}"), "-sOutputFile=%stdout".into()];
         let page = page.map(|n| [format!("-dFirstPage={n}"), format!("-dLastPage={n}")]);
         let options = options
             .into_iter()

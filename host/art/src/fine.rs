@@ -1,0 +1,201 @@
+//! Dots of colours, each by itself: a table of small clusters picks its stack.
+//!
+//! Problem: letters, lines and photographs in process inks must each have the colours that were asked for, as an eye sees them
+//! at reading distance, and nothing drawn elsewhere may change a dot.
+//! Method: a dot asks only for its own colour, whose mixture (`mixtures`) lies on [0, 1) with the stacks in order of lightness; the
+//! threshold of the green noise at the dot ([`Table`]) picks one. A colour that is a stack is that stack. A dot is flat if [`ALIKE`] of its
+//! eight neighbours have its very colour; at edges between flat dots the mixture leans towards the edge (`lean`).
+//! Strips of rows are made independently of each other; each reads [`HALO`] rows beyond itself.
+//! Cost: some 20 ns a dot of a photograph, 5 ns of a page of text. Memory: a byte a dot, and a strip for each thread.
+//! Limits: process inks, and colours of 8 bits.
+//! Source: `green_noise` of the halftone for the table; three examinations by a model of the eye for the rest (docs/decisions/flat-art.md).
+
+#[cfg(test)]
+mod figures;
+mod lean;
+mod mixtures;
+#[cfg(test)]
+mod tests;
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::fit::Fit;
+use super::key::{DRAWN, Key, LABEL, colour};
+use super::solids::Solids;
+use appearance::wide::wide;
+use halftone::green_noise::{SIDE, Table};
+use lean::{AREA, FLAT, Leans};
+use mixtures::{Mixtures, Stops};
+
+/// Rows of a strip.
+const STRIP: usize = 64;
+/// Rows beyond a strip that decide about its dots: those of the dots whose flatness says whether there is an edge beside the
+/// partner of a dot.
+const HALO: usize = 4;
+/// Neighbours of its very colour that make a dot flat: a line of one dot has two.
+const ALIKE: u8 = 2;
+/// All of them.
+const ALL: u8 = 8;
+
+/// The number of the stack of every dot. `rows` writes the colours of rows of dots.
+pub(super) fn dots(
+    rows: impl Fn(Range<usize>, &mut [Key]) + Sync,
+    (width, height): (usize, usize),
+    fit: &Fit,
+    solids: &Solids<'_>,
+    table: &Table,
+) -> Vec<u8> {
+    // Sixteen are the stacks of four inks in one order.
+    match fit.stacks.len() {
+        ..=16 => strips::<16>(&rows, (width, height), STRIP, &Mixtures::new(fit, solids), table),
+        _ => strips::<256>(&rows, (width, height), STRIP, &Mixtures::new(fit, solids), table),
+    }
+}
+
+fn strips<const N: usize>(
+    rows: &(impl Fn(Range<usize>, &mut [Key]) + Sync),
+    (width, height): (usize, usize),
+    strip: usize,
+    mixtures: &Mixtures<'_, N>,
+    table: &Table,
+) -> Vec<u8> {
+    let mut index = vec![0; width * height];
+    index.par_chunks_mut(width * strip).enumerate().for_each(|(number, out)| {
+        let top = number * strip;
+        let strip = Strip::new(rows, (width, height), top..top + out.len() / width);
+        wide(
+            #[inline(always)]
+            || strip.pick(mixtures, table, out),
+        );
+    });
+    index
+}
+
+/// The dots of a strip and those beyond it that decide about them.
+struct Strip {
+    width: usize,
+    /// The strip's own rows among those read.
+    own: Range<usize>,
+    /// The strip's first row on the page.
+    top: usize,
+    /// The colours of the dots, row by row, with [`FLAT`].
+    keys: Vec<Key>,
+}
+
+impl Strip {
+    fn new(
+        read: &impl Fn(Range<usize>, &mut [Key]),
+        (width, height): (usize, usize),
+        rows: Range<usize>,
+    ) -> Strip {
+        let all = rows.start.saturating_sub(HALO)..(rows.end + HALO).min(height);
+        let own = rows.start - all.start..rows.end - all.start;
+        let mut plain = vec![0; width * all.len()];
+        read(all, &mut plain);
+        let mut keys = plain.clone();
+        let last = plain.len() / width - 1;
+        for (y, out) in keys.chunks_exact_mut(width).enumerate() {
+            let row = |y: usize| &plain[y * width..(y + 1) * width];
+            // Beyond the page there is nothing, so a border has its own colour outside only where it goes on.
+            let around = [(y > 0).then(|| row(y - 1)), Some(row(y)), (y < last).then(|| row(y + 1))];
+            wide(
+                #[inline(always)]
+                || mark_flat(out, around),
+            );
+        }
+        Strip { width, own, top: rows.start, keys }
+    }
+
+    #[inline(always)]
+    fn pick<const N: usize>(&self, mixtures: &Mixtures<'_, N>, table: &Table, out: &mut [u8]) {
+        let mut leans = Leans::new(&self.keys, self.width);
+        let mut known = Known::new(mixtures);
+        for (y, out) in self.own.clone().zip(out.chunks_exact_mut(self.width)) {
+            let thresholds = table.row(self.top + y - self.own.start);
+            let keys = &self.keys[y * self.width..(y + 1) * self.width];
+            let mut at = (Key::MAX, [0; N]);
+            for (x, (&key, out)) in keys.iter().zip(&mut *out).enumerate() {
+                if key != at.0 {
+                    at = (key, *known.stops(key));
+                }
+                *out = mixtures.order[Mixtures::pick(&at.1, thresholds[x % SIDE])];
+            }
+            for lean in leans.row(y) {
+                let stops = known.leaning(lean);
+                out[lean.x] = mixtures.order[Mixtures::pick(&stops, thresholds[lean.x % SIDE])];
+            }
+        }
+    }
+}
+
+/// Marks the flat ones among the dots of a row. `around` are the rows above, of these dots and below, without marks.
+#[inline(always)]
+fn mark_flat(out: &mut [Key], around: [Option<&[Key]>; 3]) {
+    let width = out.len();
+    let Some(own) = around[1] else { return };
+    let mut alike = vec![0u8; width];
+    for row in around.into_iter().flatten() {
+        for (right, left) in [(0, 1), (0, 0), (1, 0)] {
+            if left == right && std::ptr::eq(row, own) {
+                continue;
+            }
+            // The dots that have a neighbour there.
+            let (dots, beside) = (&own[left..width - right], &row[right..width - left]);
+            for (alike, (a, b)) in alike[left..].iter_mut().zip(dots.iter().zip(beside)) {
+                *alike += u8::from(a == b);
+            }
+        }
+    }
+    for (out, alike) in out.iter_mut().zip(alike) {
+        *out |= if alike >= ALIKE { FLAT } else { 0 };
+        *out |= if alike == ALL && *out & DRAWN == 0 { AREA } else { 0 };
+    }
+}
+
+/// The stops of the colours that were asked for last.
+struct Known<'a, const N: usize> {
+    mixtures: &'a Mixtures<'a, N>,
+    /// By a hash of the colour.
+    last: Vec<(Key, Stops<N>)>,
+    leaning: std::collections::HashMap<(Key, Key, bool), Stops<N>>,
+}
+
+/// Colours that are kept.
+const KEPT: usize = 1 << 10;
+
+impl<'a, const N: usize> Known<'a, N> {
+    fn new(mixtures: &'a Mixtures<'a, N>) -> Known<'a, N> {
+        Known { mixtures, last: vec![(Key::MAX, [0; N]); KEPT], leaning: Default::default() }
+    }
+
+    #[inline]
+    fn stops(&mut self, key: Key) -> &Stops<N> {
+        let known = &mut self.last[(key.wrapping_mul(0x9e37_79b1) >> 22) as usize % KEPT];
+        if known.0 != key {
+            let drawn = key & DRAWN > 0;
+            // The step of a shading in a picture is no colour of its own.
+            let is_flat = key & if drawn { FLAT } else { AREA } > 0;
+            let stops = match key & LABEL > 0 {
+                true => self.mixtures.label(colour(key)),
+                false if is_flat => self.mixtures.flat(colour(key), drawn),
+                false => self.mixtures.stops(colour(key), drawn),
+            };
+            *known = (key, stops);
+        }
+        &known.1
+    }
+
+    fn leaning(&mut self, lean: &lean::Lean) -> Stops<N> {
+        let key = (lean.own, lean.other, lean.at_edge);
+        if let Some(stops) = self.leaning.get(&key) {
+            return *stops;
+        }
+        // Beside an edge a colour of a picture is an area, too.
+        let (own, other) = (*self.stops(lean.own | AREA), *self.stops(lean.other | AREA));
+        let stops = lean::leaning(&own, &other, lean.at_edge);
+        self.leaning.insert(key, stops);
+        stops
+    }
+}

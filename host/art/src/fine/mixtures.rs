@@ -1,0 +1,190 @@
+//! The mixture of every colour, in the form in which a threshold picks from it.
+//!
+//! Problem: thirty million dots each need the stack that their threshold picks from the mixture of their colour.
+//! Method: the stacks lie in order of lightness on [0, 1), the darkest first, each with its share; [`Stops`] are where they end. So
+//! a threshold picks the stack whose number is how many stops it has reached. Stops are linear in the shares: those of the nodes
+//! of the `lattice` are interpolated like mixtures. In flat colours a share below [`LEAST`] is dropped, since it would only be specks, and the colours
+//! that are the name of a stack are that stack.
+//! Cost: 10 ns a colour. Limits: `N` stacks.
+
+use inks::Stack;
+
+use super::super::fit::Fit;
+use super::super::lattice::{ALL, NODES};
+use super::super::solids::Solids;
+use appearance::weights::ONE;
+
+/// The share that counts in a flat colour.
+const LEAST: u16 = (ONE as u32 * 3 / 100) as u16;
+
+/// Where each stack ends, in the order of [`Mixtures::stacks`]; [`ONE`] after the last.
+pub type Stops<const N: usize> = [u16; N];
+
+/// The mixtures of all colours.
+pub struct Mixtures<'a, const N: usize> {
+    solids: &'a Solids<'a>,
+    /// The stacks in the order of lightness.
+    stacks: Vec<Stack>,
+    /// Stops of the nodes of each lattice.
+    nodes: Vec<Stops<N>>,
+    /// Places of the 256 values between nodes.
+    steps: [(usize, u32); 256],
+    /// The lattice of pictures, and that of text and drawings.
+    lattices: [usize; 2],
+    /// The number in that order of the stack that each corner of sRGB names; red, green and blue are a bit each.
+    named: [Option<usize>; 8],
+    /// The light of each, relative to paper.
+    light: [f64; N],
+    /// For each number in that order the number of the stack.
+    pub order: [u8; N],
+}
+
+impl<'a, const N: usize> Mixtures<'a, N> {
+    /// Of a fit with at most `N` stacks.
+    pub fn new(fit: &Fit, solids: &'a Solids<'a>) -> Mixtures<'a, N> {
+        let mut numbers: Vec<usize> = (0..fit.stacks.len()).collect();
+        let luminance = |stack: &Stack| {
+            let [r, g, b] = solids.body(stack);
+            0.2126 * r + 0.7152 * g + 0.0722 * b
+        };
+        let of_each: Vec<f64> = fit.stacks.iter().map(luminance).collect();
+        numbers.sort_by(|&a, &b| of_each[a].total_cmp(&of_each[b]));
+        let (mut order, mut light) = ([0; N], [0.0; N]);
+        for (at, &number) in numbers.iter().enumerate() {
+            (order[at], light[at]) = (number as u8, of_each[number]);
+        }
+        let nodes = fit.shares().map(|shares| {
+            let sums = numbers.iter().scan(0, |sum, &q| {
+                *sum += shares[q];
+                Some(*sum)
+            });
+            let mut stops = [ONE; N];
+            let total: u64 = shares.iter().sum();
+            stops.iter_mut().zip(sums).for_each(|(stop, sum)| {
+                *stop = ((sum * u64::from(ONE) + total / 2) / total.max(1)) as u16;
+            });
+            stops
+        });
+        let named = std::array::from_fn(|bits| {
+            let stack = solids.named([4, 2, 1].map(|bit| if bits & bit > 0 { 255 } else { 0 }))?;
+            numbers.iter().position(|&q| fit.stacks[q] == stack)
+        });
+        Mixtures {
+            solids,
+            stacks: numbers.iter().map(|&q| fit.stacks[q].clone()).collect(),
+            nodes: nodes.collect(),
+            steps: fit.steps,
+            lattices: [0, fit.of_drawings],
+            named,
+            light,
+            order,
+        }
+    }
+
+    /// The stops of a colour that names a stack.
+    fn named(&self, colour: [u8; 3]) -> Option<Stops<N>> {
+        if colour.iter().any(|&v| v != 0 && v != 255) {
+            return None;
+        }
+        let bits = colour.iter().fold(0, |bits, &v| 2 * bits + usize::from(v > 0));
+        self.named[bits].map(alone)
+    }
+
+    /// The stops of the colour of a label: its solid, if there is one.
+    pub fn label(&self, colour: [u8; 3]) -> Stops<N> {
+        let solid = self.solids.nearest(colour);
+        let at = solid.and_then(|solid| self.stacks.iter().position(|known| known == solid));
+        self.named(colour).or(at.map(alone)).unwrap_or_else(|| self.flat(colour, true))
+    }
+
+    /// The stops of a colour of a picture, or of text or a drawing.
+    #[inline]
+    pub fn stops(&self, colour: [u8; 3], drawn: bool) -> Stops<N> {
+        self.named(colour).unwrap_or_else(|| self.between(colour, drawn))
+    }
+
+    /// The stops between the nodes of the lattice.
+    #[inline]
+    fn between(&self, colour: [u8; 3], drawn: bool) -> Stops<N> {
+        let [x, y, z] = colour.map(|v| self.steps[usize::from(v)]);
+        let mut axes = [(x.1, NODES * NODES), (y.1, NODES), (z.1, 1)];
+        for (a, b) in [(0, 1), (1, 2), (0, 1)] {
+            if axes[a].0 < axes[b].0 {
+                axes.swap(a, b);
+            }
+        }
+        let mut node = self.lattices[usize::from(drawn)] * ALL + (x.0 * NODES + y.0) * NODES + z.0;
+        let mut sums = [0u16; N];
+        let mut last = 256;
+        for (next, step) in axes.into_iter().chain([(0, 0)]) {
+            let part = last - next;
+            if part == 256 {
+                return self.nodes[node];
+            }
+            if part > 0 {
+                for (sum, &stop) in sums.iter_mut().zip(&self.nodes[node]) {
+                    *sum += ((u32::from(stop) * (part << 8)) >> 16) as u16;
+                }
+            }
+            (last, node) = (next, node + step);
+        }
+        // Rounding down loses less than one unit at each of four nodes.
+        sums.map(|sum| if sum > ONE - 4 { ONE } else { sum })
+    }
+
+    /// The stops of a flat colour.
+    pub fn flat(&self, colour: [u8; 3], drawn: bool) -> Stops<N> {
+        let whole = shares(&self.stops(colour, drawn));
+        if whole.iter().all(|&share| share == 0 || share >= LEAST) {
+            return stops(&whole);
+        }
+        stops(&self.without_specks(&whole))
+    }
+
+    /// Such shares without those that are less than [`LEAST`]. What they do to the lightness the others make up for: each changes in
+    /// proportion to how much lighter than their mean it is.
+    fn without_specks(&self, whole: &[u16; N]) -> [u16; N] {
+        let kept = whole.map(|share| if share < LEAST { 0.0 } else { f64::from(share) });
+        let mean = |shares: &[f64; N]| {
+            let sum: f64 = shares.iter().sum();
+            shares.iter().zip(&self.light).map(|(share, light)| share * light).sum::<f64>() / sum.max(1.0)
+        };
+        let (wanted, found) = (mean(&whole.map(f64::from)), mean(&kept));
+        let total: f64 = kept.iter().sum();
+        let off = |q: usize| self.light[q] - found;
+        let spread: f64 = (0..N).map(|q| kept[q] / total.max(1.0) * off(q).powi(2)).sum();
+        let tilt = if spread > 0.0 { (wanted - found) / spread } else { 0.0 };
+        let tilted: [f64; N] = std::array::from_fn(|q| kept[q] * (1.0 + tilt * off(q)).max(0.0));
+        let total: f64 = tilted.iter().sum();
+        tilted.map(|share| (share * f64::from(ONE) / total.max(1.0)) as u16)
+    }
+
+    /// The stack, in that order, that a threshold picks.
+    #[inline]
+    pub fn pick(stops: &Stops<N>, threshold: u16) -> usize {
+        let reached: u16 = stops.iter().map(|&stop| u16::from(stop <= threshold)).sum();
+        reached.into()
+    }
+}
+
+/// The stops of a stack alone.
+fn alone<const N: usize>(stack: usize) -> Stops<N> {
+    std::array::from_fn(|q| if q < stack { 0 } else { ONE })
+}
+
+/// The share of each stack.
+pub fn shares<const N: usize>(stops: &Stops<N>) -> [u16; N] {
+    std::array::from_fn(|q| stops[q] - if q > 0 { stops[q - 1] } else { 0 })
+}
+
+/// Where stacks with such shares end; what rounding leaves goes to the lightest that has any.
+pub fn stops<const N: usize>(shares: &[u16; N]) -> Stops<N> {
+    let mut sum = 0;
+    let mut stops = shares.map(|share| {
+        sum += share;
+        sum
+    });
+    let last = shares.iter().rposition(|&share| share > 0).unwrap_or(0);
+    stops[last..].fill(ONE);
+    stops
+}
