@@ -30,7 +30,10 @@ const SPEAKS: &str = "userdict /QUIET false put";
 /// Copies are the print system's affair, and since 10.04 each copy of a page with tags has its bytes in another order. PostScript asks for copies in
 /// two ways.
 const ONE_COPY: &str = "-dNumCopies=1";
-const NO_COPIES: &str = "userdict begin /setpagedevice { dup /NumCopies known { dup length dict copy dup /NumCopies undef } if \
+const NO_COPIES: &str = "userdict begin \
+    /findfont { dup type /nametype eq { dup /Font resourcestatus { pop pop } { (%%NoFont: ) print dup =only (\\n) print flush } \
+    ifelse } if systemdict /findfont get exec } bind def \
+    /selectfont { 1 index type /nametype eq { exch findfont exch } if systemdict /selectfont get exec } bind def /setpagedevice { dup /NumCopies known { dup length dict copy dup /NumCopies undef } if \
     systemdict /setpagedevice get exec } bind def end";
 
 /// Whether a document is PDF.
@@ -38,9 +41,9 @@ const NO_COPIES: &str = "userdict begin /setpagedevice { dup /NumCopies known { 
 /// # Errors
 /// Those of opening it.
 pub(super) fn is_pdf(path: &Path) -> io::Result<bool> {
-    let mut start = [0; 4];
-    let mut file = File::open(path)?;
-    Ok(file.read_exact(&mut start).is_ok() && &start == b"%PDF")
+    let mut start = Vec::new();
+    File::open(path)?.take(super::HEADER as u64).read_to_end(&mut start)?;
+    Ok(super::is_pdf(&start))
 }
 
 /// Ghostscript's interpreter of PDF.
