@@ -12,7 +12,7 @@ use super::coverage::{Coverage, Scan};
 use super::edges::Edges;
 use super::key::{colour, key};
 use super::options::Options;
-use super::{bitplane, names, resample};
+use super::{bitplane, names, resample, trace};
 use sheet::Plane;
 
 /// Least coverage of a dot that is ink.
@@ -74,6 +74,10 @@ pub struct Artwork {
     pub drawn: Plane,
     /// Dots that are not transparent, if the art has transparency.
     pub opaque: Option<Plane>,
+    /// How many dots of white are knocked out by colours that are drawn over it.
+    pub knocked_out: u64,
+    /// What is for a cutter and not printed, if it was asked for.
+    pub cuts: Option<Plane>,
     /// What the reader had to assume, in sentences.
     pub notes: Vec<String>,
 }
@@ -90,8 +94,25 @@ impl Artwork {
             colour: None,
             drawn: bitplane::blank(width, length),
             opaque: None,
+            knocked_out: 0,
+            cuts: None,
             notes: Vec::new(),
         }
+    }
+
+    /// Adds what is for a cutter, from its coverage, one byte a dot.
+    pub(super) fn add_cut(&mut self, coverage: &[u8]) {
+        let plane = bitplane::from_bytes(self.width, coverage, |c| c >= THRESHOLD);
+        match &mut self.cuts {
+            Some(cuts) => bitplane::add(cuts, &plane),
+            None => self.cuts = Some(plane),
+        }
+    }
+
+    /// The paths for a cutter; `None` if what is for it are no lines but has too many dots.
+    #[must_use]
+    pub fn cut_paths(&self) -> Option<Vec<trace::Path>> {
+        self.cuts.as_ref().map_or(Some(Vec::new()), trace::paths)
     }
 
     /// Adds a layer. `plate` marks the coverage as that of a printing plate, which keeps its tones, and adds nothing if it is
@@ -158,6 +179,8 @@ fn layer(
         notes.push(note);
     }
     let size = (scan.width, scan.height);
+    let most = scan.coverage.par_iter().copied().max().unwrap_or(0);
+    let faint = (1..THRESHOLD).contains(&most) && matches!(scan.by, Coverage::Opaque | Coverage::Drawn);
     let coverage = match tones {
         true => {
             let finer = size.0 as usize > width || size.1 as usize > length;
@@ -173,7 +196,12 @@ fn layer(
     if let Shape::Solid(plane) = &layer.shape
         && plane.dots() == 0
     {
-        notes.push(format!("{}: no pixel is dark enough to be ink; draw layers in black", layer.name));
+        notes.push(if faint {
+            let opacity = 100.0 * f64::from(most) / 255.0;
+            format!("{name}: nothing in it is opaque enough to be ink: its opacity is at most {opacity:.0} %; make it opaque")
+        } else {
+            format!("{name}: no pixel is dark enough to be ink; draw layers in black")
+        });
     }
     (layer, notes)
 }

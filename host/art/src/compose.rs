@@ -265,6 +265,9 @@ fn layers(slots: &[Slot], mask: usize, settings: &Settings) -> Vec<Ink> {
         coat.sort_by_key(|&ink| customary(ink));
         layers.splice(from..foil, coat);
     }
+    if settings.accept.contains(&Accept::SilverUnderWhite) && layers.first() == Some(&Ink::White) {
+        layers.insert(0, Ink::MetallicSilver);
+    }
     if settings.accept.contains(&Accept::EvenWhite)
         && let Some(at) = layers.windows(2).position(|pair| pair == [Ink::Black, Ink::White])
     {
@@ -318,6 +321,7 @@ fn stack_up(
     let order: Vec<Ink> = slots.iter().map(|slot| slot.ink).collect();
     let mut suggestions = suggest::suggest(dots.stacks(), &counts, &order);
     suggestions.extend(suggest::rare(&laid));
+    suggestions.extend(suggest::knocked_out(art.knocked_out));
     let size_mm = ((width / art.across) as f64 * MM, length as f64 * MM);
     Ok(Composed { report: Report { size_mm, laid, bare: counts[0], notes }, dots, suggestions })
 }

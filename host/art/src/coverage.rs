@@ -113,7 +113,7 @@ impl CoverageBuilder {
     }
 
     /// For a drawing, which has no ground: what is drawn in one colour is ink even if it leaves no pixel free.
-    fn of_drawing(pixels: usize) -> CoverageBuilder {
+    pub fn of_drawing(pixels: usize) -> CoverageBuilder {
         CoverageBuilder { transparent: true, ..CoverageBuilder::new(pixels, true) }
     }
 

@@ -8,6 +8,7 @@ use std::fmt::Display;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 
+use ::tiff::tags::Tag;
 use image::{DynamicImage, ImageError, ImageFormat};
 use observe::Diagnosis;
 use pictures::Bounds;
@@ -16,35 +17,41 @@ use pictures::resolution::{self, Dpi};
 use super::error::{io, wrong};
 use super::orientation::Turn;
 use super::size::{MOST_BYTES, MOST_PIXELS, check_pixels};
-use super::tiff_pages;
+use super::{foreign, tiff_kinds, tiff_pages};
 
 /// A decoded picture, the right way up.
 pub(super) struct Decoded {
     pub image: DynamicImage,
     pub dpi: Option<Dpi>,
     pub profile: Option<Vec<u8>>,
+    /// The power of its values, if they have neither a profile nor that of sRGB.
+    pub gamma: Option<f64>,
+    /// What had to be assumed.
+    pub notes: Vec<String>,
 }
+
+/// How much of a file tells its format.
+const START: usize = 1 << 12;
 
 /// Decodes a whole picture; of a TIFF with several pages the one of this number.
 pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Result<Decoded, Diagnosis> {
     let mut bytes = Vec::new();
     file.by_ref().take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(io(path, "read it"))?;
-    let guessed = image::guess_format(&bytes).ok();
+    let big = tiff_pages::is_tiff(&bytes).then_some(ImageFormat::Tiff);
+    let guessed = image::guess_format(&bytes).ok().or(big);
     let format = guessed.filter(|format| {
         use ImageFormat::{Bmp, Gif, Jpeg, Png, Pnm, Tiff, WebP};
         matches!(format, Png | Jpeg | Tiff | Pnm | Bmp | Gif | WebP)
     });
     let Some(format) = format else {
-        let (found, way) = match guessed {
-            Some(format) => {
+        let foreign = foreign::format(&bytes[..bytes.len().min(START)]);
+        let (found, way) = match (foreign, guessed) {
+            _ if bytes.is_empty() => ("an empty file".into(), None),
+            (Some((name, way)), _) => (name.to_owned(), Some(way)),
+            (None, Some(format)) => {
                 (format!("{format:?}").to_uppercase() + ", which is not read", Some("save it as PNG"))
             }
-            None if bytes.is_empty() => ("an empty file".into(), None),
-            // As drawings in `.svgz` are.
-            None if bytes.starts_with(b"\x1f\x8b") => {
-                ("a compressed one".into(), Some("unpack it, such as with gunzip"))
-            }
-            None => ("an unknown format".into(), None),
+            (None, None) => ("an unknown format".into(), None),
         };
         let diagnosis = wrong(
             path,
@@ -67,6 +74,9 @@ pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Res
         _ => {}
     }
     let bad = |error: ImageError| {
+        if let (ImageError::Unsupported(found), ImageFormat::Tiff) = (&error, format) {
+            return tiff_kinds::refused(path, &bytes, found);
+        }
         if let ImageError::Unsupported(found) = &error {
             return wrong(path, found.to_string())
                 .hint("save the picture in RGB or grey, with 8 or 16 bits a channel");
@@ -74,6 +84,11 @@ pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Res
         let cause = if let ImageError::IoError(cause) = &error { Some(cause) } else { None };
         undecodable(path, &error, cause)
     };
+    if format == ImageFormat::Tiff
+        && let Some(read) = tiff_kinds::read(path, &bytes)?
+    {
+        return Ok(of_tiff(read, &bytes));
+    }
     let bounds = Bounds { side: None, bytes: 8 * MOST_PIXELS };
     let mut opened = pictures::open(&bytes, format, bounds).map_err(bad)?;
     let (width, height) = opened.size();
@@ -83,7 +98,22 @@ pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Res
     let dpi = turn.dpi(resolution::of_file(&bytes, format));
     let mut image = opened.decode().map_err(bad)?;
     image.apply_orientation(turn.0);
-    Ok(Decoded { image, dpi, profile })
+    let gamma = if format == ImageFormat::Png { pictures::gamma(&bytes) } else { None };
+    Ok(Decoded { image, dpi, profile, gamma, notes: Vec::new() })
+}
+
+/// A picture in TIFF with what its tags say of it.
+fn of_tiff(read: tiff_kinds::Read, bytes: &[u8]) -> Decoded {
+    const PROFILE: Tag = Tag::Unknown(34675);
+    let tiff_kinds::Read { mut image, notes, converted } = read;
+    let Some(mut decoder) = resolution::tiff_decoder(bytes) else {
+        return Decoded { image, dpi: None, profile: None, gamma: None, notes };
+    };
+    let turn = Turn::of_tag(decoder.find_tag_unsigned(Tag::Orientation).ok().flatten());
+    let dpi = turn.dpi(resolution::of_file(bytes, ImageFormat::Tiff));
+    let profile = decoder.find_tag(PROFILE).ok().flatten().and_then(|value| value.into_u8_vec().ok());
+    image.apply_orientation(turn.0);
+    Decoded { image, dpi, profile: profile.filter(|_| !converted), gamma: None, notes }
 }
 
 /// A picture that ends before its end.

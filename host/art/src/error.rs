@@ -70,18 +70,17 @@ pub(super) fn unknown_ink(path: &Path, part: NamedPart, name: &str, suggestion: 
         .hint(format!("the inks are {}", Ink::ALL.map(Ink::name).join(", ")))
 }
 
-/// Neither the file nor the settings state a size, and at 600 dpi the art is larger than the page. `fits_mm` is the largest width
-/// that fits.
+/// Neither the file nor the settings state a size, and in the measure that is assumed the art is larger than the page. `fits_mm` is
+/// the largest width that fits.
 pub(super) fn no_size(
-    path: &Path,
-    pixels: (f64, f64),
+    (path, lacks, dpi): (&Path, &str, &str),
+    (pixels, measure): ((f64, f64), &str),
     size_mm: (f64, f64),
     room_mm: (f64, f64),
     fits_mm: f64,
 ) -> Diagnosis {
     let problem = format!(
-        "{} states no resolution; its {:.0} x {:.0} pixels at 600 dpi would be {:.1} x {:.1} mm, but the page has room for {:.1} x \
-         {:.1} mm",
+        "{} states no {lacks}; its {:.0} x {:.0} {measure} would be {:.1} x {:.1} mm, but the page has room for {:.1} x {:.1} mm",
         path.display(),
         pixels.0,
         pixels.1,
@@ -93,7 +92,7 @@ pub(super) fn no_size(
     let diagnosis = Diagnosis::new(Fault::Setting, problem);
     match largest(fits_mm) {
         None => nothing_fits(diagnosis),
-        Some(size) => diagnosis.hint("set its resolution or its size").set("dpi", "1200").set("size", size),
+        Some(size) => diagnosis.hint("set its resolution or its size").set("dpi", dpi).set("size", size),
     }
 }
 

@@ -3,10 +3,12 @@
 //! Problem: owners name files `white.png`, `01-white.png`, `Gold Foil` or `decal_metallic gold 2`.
 //! Method: a leading number is the layer's place from the paper up; a trailing number tells two layers of one ink apart. The
 //! words between them are compared with the known names: the whole first, then the longest ending, then the longest
-//! beginning, so `gold foil` never means `gold`. Limits: English names; codes of one or two letters only as the whole name.
+//! beginning, so `gold foil` never means `gold`. Spot colours of old Japanese programs
+//! are in Shift-JIS. Limits: English and Japanese names; codes of one or two letters only as the whole name.
 
 use std::path::Path;
 
+use encoding_rs::SHIFT_JIS;
 use observe::Diagnosis;
 use protocol::ink::Ink;
 
@@ -55,10 +57,17 @@ pub(super) fn ink(name: &str) -> Option<Named> {
     let ends = (0..n).map(|at| &words[at..]);
     let begins = (1..n).rev().map(|at| &words[..at]);
     // Codes of one or two letters must be the whole name: `logo-m` may state a size.
-    ends.chain(begins)
-        .filter(|part| part.len() == n || part.join("-").len() > 2)
-        .find_map(exact)
-        .map(|ink| Named { place, ink })
+    let found = ends.chain(begins).filter(|part| part.len() == n || part.join("-").len() > 2).find_map(exact);
+    found.map(|ink| Named { place, ink }).or_else(|| self::ink(&shift_jis(name)?))
+}
+
+/// A name that was read as Latin-1, in the encoding that Japanese programs wrote spot colours in, if it is in it.
+fn shift_jis(name: &str) -> Option<String> {
+    let bytes: Option<Vec<u8>> = name.chars().map(|c| u8::try_from(u32::from(c)).ok()).collect();
+    let bytes = bytes.filter(|bytes| !bytes.is_ascii())?;
+    let text = SHIFT_JIS.decode_without_bom_handling_and_without_replacement(&bytes)?;
+    // A few codes stand for themselves.
+    Some(text.into_owned()).filter(|text| text != name)
 }
 
 /// Words that say of a name only that it is one of an ink.
@@ -162,6 +171,11 @@ mod tests {
             ("Spot White", None, Ink::White),
             ("white-2", None, Ink::White),
             ("badge (Black)", None, Ink::Black),
+            ("01_白", Some(1), Ink::White),
+            ("デカール 金", None, Ink::MetallicGold),
+            // 白 and 銀箔 in Shift-JIS, read as Latin-1.
+            ("\u{94}\u{92}", None, Ink::White),
+            ("\u{8b}\u{e2}\u{94}\u{93}", None, Ink::SilverFoil),
         ] {
             assert_eq!(ink(name), Some(Named { place, ink: wanted }), "{name}");
         }

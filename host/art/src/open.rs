@@ -19,15 +19,16 @@ use super::names::{self, stem};
 use super::options::{Options, Pages};
 use super::picture::Looks;
 use super::size::{self, MOST_BYTES, Unstated};
-use super::{cmyk, pdf, picture, svg, tiff, tiff_pages};
+use super::{cmyk, layered, pdf, picture, svg, tiff, tiff_pages};
 use pictures::resolution::Dpi;
 
 /// File extensions of pictures.
 const PICTURES: [&str; 11] = ["png", "tif", "tiff", "jpg", "jpeg", "pgm", "pbm", "ppm", "bmp", "gif", "webp"];
 
 /// File extensions of art that is not read as one of several layers.
-const OTHERS: [&str; 15] = [
-    "ai", "avif", "eps", "heic", "jp2", "jxl", "kra", "pdf", "ps", "psb", "psd", "svg", "svgz", "tga", "xcf",
+const OTHERS: [&str; 17] = [
+    "ai", "avif", "cdr", "eps", "heic", "jp2", "jxl", "kra", "ora", "pdf", "ps", "psb", "psd", "svg", "svgz",
+    "tga", "xcf",
 ];
 
 /// The most pictures in a folder.
@@ -84,7 +85,8 @@ pub fn is_art(path: &Path) -> bool {
             .is_ok_and(|listing| listing.pictures.iter().all(|file| names::ink(&stem(file)).is_some()));
     }
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    ["svg", "pdf", "ps", "eps"].contains(&extension.as_str()) || PICTURES.contains(&extension.as_str())
+    ["svg", "pdf", "ps", "eps", "ora", "kra"].contains(&extension.as_str())
+        || PICTURES.contains(&extension.as_str())
 }
 
 fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, Diagnosis> {
@@ -92,7 +94,7 @@ fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<
     if pdf::is_document(&start) {
         return pdf::read(file, options, observer);
     }
-    if start.starts_with(b"II*\0") || start.starts_with(b"MM\0*") {
+    if tiff_pages::is_tiff(&start) {
         if let Pages::Inks(inks) = &options.pages {
             return pages_of_inks(file, inks, options, observer);
         }
@@ -104,6 +106,9 @@ fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<
     }
     if svg::is_svg(file, &start) {
         return svg::read(file, options, observer);
+    }
+    if layered::is_layered(&start) {
+        return layered::read(file, options, observer);
     }
     let name = stem(file);
     let named = names::ink(&name).filter(|_| !options.reserved);
@@ -235,9 +240,12 @@ fn named_files(
         let named =
             names::ink(&ink).ok_or_else(|| unknown_ink(path, NamedPart::File, &ink, names::closest(&ink)))?;
         let start = start_of(path)?;
-        let is_svg = svg::is_svg(path, &start);
-        if pdf::is_document(&start) || is_svg {
-            let kind = if is_svg { "SVG" } else { "PDF or PostScript" };
+        let kinds = [
+            (svg::is_svg(path, &start), "SVG"),
+            (pdf::is_document(&start), "PDF or PostScript"),
+            (layered::is_layered(&start), "OpenRaster or Krita's own format"),
+        ];
+        if let Some((_, kind)) = kinds.into_iter().find(|(is, _)| *is) {
             let problem = format!("it is {kind}, which is read alone and cannot be one of several layers");
             return Err(wrong(path, problem).hint("export it as PNG, or draw all layers in it"));
         }

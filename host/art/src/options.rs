@@ -24,6 +24,10 @@ pub struct Options {
     pub across: usize,
     /// The inks that reserved colours may stand for.
     pub inks: InkSet,
+    /// Whether lines for a cutter are read as [`Artwork::cuts`](super::Artwork::cuts).
+    pub cut_lines: bool,
+    /// Whether white keeps the dots that colours drawn over it would knock out.
+    pub keep_white: bool,
     /// Room on the page: art without a size of its own is fitted to it.
     pub room: Room,
 }
@@ -76,6 +80,8 @@ impl Default for Options {
             tones: InkSet::EMPTY,
             across: 1,
             inks: InkSet::default().with(Ink::White),
+            cut_lines: false,
+            keep_white: false,
             room: Room::default(),
         }
     }

@@ -12,11 +12,12 @@ pub mod conversion;
 mod draw;
 mod eps;
 mod ghostscript;
+mod optional;
 mod plates;
 
 use std::path::Path;
 
-use protocol::ink::Ink;
+use protocol::ink::{Ink, Kind};
 
 use super::artwork::{Artwork, Layer};
 use super::coverage::Scan;
@@ -33,9 +34,23 @@ pub use complaint::{OLDER, cut_short, damaged, no_page};
 pub use ghostscript::{Interpreter, command, interpreter, order};
 pub use plates::{Separated, Survey, separated, survey};
 
+/// How far from the beginning of a file readers look for the header of a PDF.
+const HEADER: usize = 1024;
+
 /// Whether these are the first bytes of a document for [`read`].
 pub(super) fn is_document(start: &[u8]) -> bool {
-    start.starts_with(b"%PDF") || start.starts_with(b"%!") || start.starts_with(eps::WITH_PREVIEW)
+    is_pdf(start) || start.starts_with(b"%!") || start.starts_with(eps::WITH_PREVIEW)
+}
+
+/// Whether these are the first bytes of a PDF. Spoolers and mail programs write a few lines before its header.
+fn is_pdf(start: &[u8]) -> bool {
+    let other = || {
+        image::guess_format(start).is_ok()
+            || start.trim_ascii_start().starts_with(b"<")
+            || start.starts_with(b"%!")
+    };
+    start.starts_with(b"%PDF")
+        || start[..start.len().min(HEADER)].windows(5).any(|word| word == b"%PDF-") && !other()
 }
 
 /// Reads a document.
@@ -53,6 +68,10 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
         Pages::Inks(inks) => document.pages_of_inks(&leaves, inks, observer)?,
     };
     observer.end();
+    let place = |note: String| format!("{}: {note}", path.display());
+    art.notes.extend(complaint::replaced_fonts(&said).map(place));
+    let spots = art.layers.iter().any(|layer| layer.ink.kind() != Kind::Process);
+    art.notes.extend(optional::notes(path, spots));
     art.notes.extend(
         damaged(&said).or_else(|| cut_short(path)).map(|doubt| format!("{}: {doubt}", path.display())),
     );

@@ -6,7 +6,7 @@
 
 use std::collections::{HashMap, HashSet};
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use image::DynamicImage;
@@ -38,9 +38,14 @@ pub(super) struct Pixels {
 /// Reads a picture and converts its colours to sRGB; of a TIFF with several pages the one of this number.
 pub(super) fn read(path: &Path, page: Option<u32>) -> Result<Pixels, Diagnosis> {
     let file = File::open(path).map_err(io(path, "open it"))?;
-    let decoded = decode(path, BufReader::new(file), page)?;
+    of(path, BufReader::new(file), page)
+}
+
+/// The same from the bytes of a picture in the file at `path`.
+pub(super) fn of(path: &Path, bytes: impl Read, page: Option<u32>) -> Result<Pixels, Diagnosis> {
+    let decoded = decode(path, bytes, page)?;
     let (width, height) = (decoded.image.width(), decoded.image.height());
-    let mut notes = Vec::new();
+    let mut notes = decoded.notes;
     let deep = matches!(
         decoded.image,
         DynamicImage::ImageLuma16(_)
@@ -56,7 +61,21 @@ pub(super) fn read(path: &Path, page: Option<u32>) -> Result<Pixels, Diagnosis> 
     if let Some(profile) = decoded.profile {
         notes.extend(to_srgb(path, &profile, grey, &mut rgba)?);
     }
+    if let Some(gamma) = decoded.gamma {
+        let table: Vec<u8> = (0..=255).map(|v| of_power(v, gamma)).collect();
+        rgba.par_chunks_exact_mut(4).for_each(|pixel| {
+            pixel[..3].iter_mut().for_each(|v| *v = table[usize::from(*v)]);
+        });
+        notes.push(format!("{}: its gamma of {gamma:.3} was applied", path.display()));
+    }
     Ok(Pixels { path: path.to_path_buf(), width, height, dpi: decoded.dpi, rgba, notes })
+}
+
+/// A value whose light has this power, in sRGB (IEC 61966-2-1).
+fn of_power(value: u8, gamma: f64) -> u8 {
+    let light = (f64::from(value) / 255.0).powf(1.0 / gamma);
+    let encoded = if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
+    (255.0 * encoded).round() as u8
 }
 
 /// Colours of which red, green and blue differ by so much are no grey.

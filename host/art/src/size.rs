@@ -3,7 +3,7 @@
 //! Problem: the size comes from the user, from the file's resolution, or from neither; and the page has limited room.
 //! Method: settings override the file. Without either, a layer takes one dot for each pixel, while a plain picture fills
 //! the room; a note says which. Art that is larger than the room is an error unless the page crops it. Units:
-//! millimetres, then dots of 600 dpi. Limits: twice the largest page on each side if it is cropped; at least one dot.
+//! millimetres, then dots of 600 dpi. A drawing that states no size on paper is measured in its program's units. Limits: twice the largest page on each side if it is cropped; at least one dot.
 
 use std::path::Path;
 
@@ -44,9 +44,18 @@ pub(super) enum Unstated {
     FillRoom,
     /// One dot for each pixel: layers of ink are drawn for the printer.
     PixelPerDot,
+    /// So many units in an inch: a drawing that states no size on paper.
+    Units(Units),
     /// Does not happen: a drawing has a size, and what is taken for its pixels is only a measure. It is known to this many
     /// millimetres.
     Drawing { rounded_mm: f64 },
+}
+
+/// Units of a drawing in an inch, and why so many, in words that follow the number.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct Units {
+    pub per_inch: f64,
+    pub why: &'static str,
 }
 
 /// A rectangle in millimetres: width, height.
@@ -140,16 +149,38 @@ fn without_resolution(
             let dpi = 25.4 * pixels.0 / size.0;
             (size, format!("as large as the page allows, {:.1} x {:.1} mm ({dpi:.0} dpi)", size.0, size.1))
         }
+        Unstated::Units(Units { per_inch, why }) => {
+            let size = (25.4 * pixels.0 / per_inch, 25.4 * pixels.1 / per_inch);
+            let measure = format!("units at {per_inch} an inch{why}");
+            if !fit.accepts(size) {
+                return Err(no_size(
+                    (path, "size on paper", "300"),
+                    (pixels, &measure),
+                    size,
+                    fit.room,
+                    fit.largest().0,
+                ));
+            }
+            (size, format!("{:.1} x {:.1} mm large: its {measure}", size.0, size.1))
+        }
         Unstated::PixelPerDot | Unstated::Drawing { .. } => {
             let size = (25.4 * pixels.0 / 600.0, 25.4 * pixels.1 / 600.0);
             if !fit.accepts(size) {
-                return Err(no_size(path, pixels, size, fit.room, fit.largest().0));
+                let measure = "pixels at 600 dpi";
+                return Err(no_size(
+                    (path, "resolution", "1200"),
+                    (pixels, measure),
+                    size,
+                    fit.room,
+                    fit.largest().0,
+                ));
             }
             (size, format!("at 600 dpi, {:.1} x {:.1} mm", size.0, size.1))
         }
     };
+    let lacks = if matches!(unstated, Unstated::Units(_)) { "size on paper" } else { "resolution" };
     notes.push(format!(
-        "{} states no resolution, so it is printed {assumed}; set its size or resolution to change this",
+        "{} states no {lacks}, so it is printed {assumed}; set its size or resolution to change this",
         path.display()
     ));
     Ok(size)

@@ -5,18 +5,24 @@
 //! layers. Each layer is rendered as the whole drawing without all others, so the clips, masks and transforms around it
 //! hold, and what is drawn in it is ink, whatever its colour. Only a layer to be halftoned has tones: there dark is ink,
 //! and so it is in pictures made of pixels. A drawing has no ground. Without layers it is one picture; its edges are exact,
-//! so reserved colours are unambiguous. Nothing drawn is thinner than a dot ([`thin`]). Rendering has a thread of its own,
-//! because filters may take for ever, and the renderer may fail on hostile drawings.
+//! so reserved colours are unambiguous. Nothing drawn is thinner than a dot ([`thin`]). What a drawing asks of the computer has
+//! [`bounds`]; what the renderer does not know is drawn by other means or named ([`strokes`], [`write`], [`unseen`]). Rendering
+//! has a thread of its own, because filters may take for ever, and the renderer may fail on hostile drawings.
 //! Cost: four bytes a dot while a layer is rendered, eight where it holds pictures. Limits: animations do not run; a layer
 //! may take as long as a page ([`process::limit`]). A thread cannot be stopped: one that takes too long ends with the
 //! program.
 
+mod bounds;
 mod find;
 mod fonts;
+mod links;
 mod nodes;
 mod render;
 mod source;
+mod strokes;
 mod thin;
+mod units;
+mod unseen;
 mod write;
 
 use std::path::{Path, PathBuf};
@@ -35,7 +41,7 @@ use super::picture;
 use super::size::{self, Unstated};
 use super::svg_kinds;
 use crate::process;
-use find::Layer;
+use find::{Cuts, Layer};
 use observe::{Diagnosis, Observer};
 use render::{Renderer, Without};
 use write::Way;
@@ -48,9 +54,6 @@ pub const DRAWING: &str = "drawing";
 /// The most bytes of a drawing.
 const MOST_BYTES: u64 = 1 << 28;
 
-/// Units in an inch of a drawing without units.
-const UNITS: f64 = 96.0;
-
 /// Reads a drawing.
 pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, Diagnosis> {
     let reading = io(path, "read it");
@@ -58,12 +61,11 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
         return Err(wrong(path, format!("the drawing is larger than {} MB", MOST_BYTES >> 20)));
     }
     let text = source::decoded(path, std::fs::read(path).map_err(&reading)?)?;
-    let mut notes = Vec::new();
-    let layers = find::layers(path, &parsed(path, &text)?, &mut notes)?;
+    let (layers, cuts, notes) = looked_at(path, &parsed(path, &text)?)?;
     observer.begin("rendering layers", layers.len().max(1) as u64);
     let (steps, done) = mpsc::channel();
-    let drawing = Drawing { path: path.to_path_buf(), text, layers, notes, options: options.clone() };
-    let begun = thread::Builder::new().name(DRAWING.into()).spawn(move || {
+    let drawing = Drawing { path: path.to_path_buf(), text, layers, cuts, notes, options: options.clone() };
+    let begun = thread::Builder::new().name(DRAWING.into()).stack_size(bounds::STACK).spawn(move || {
         // Nobody listens any more if it took too long.
         let drawn = drawing.draw(&|| drop(steps.send(None)));
         let _ = steps.send(Some(drawn));
@@ -83,6 +85,20 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     };
     observer.end();
     art
+}
+
+/// The layers of a drawing, what of it is for a cutter, and notes on it. What would take the renderer too long, or its stack, is an
+/// error.
+fn looked_at(
+    path: &Path,
+    document: &roxmltree::Document<'_>,
+) -> Result<(Vec<Layer>, Cuts, Vec<String>), Diagnosis> {
+    bounds::check(document)
+        .map_err(|beyond| wrong(path, beyond).hint("simplify the drawing, or export it as PNG"))?;
+    let mut notes = Vec::new();
+    let (layers, cuts) = find::layers(path, document, &mut notes)?;
+    notes.extend(unseen::note(path, document));
+    Ok((layers, cuts, notes))
 }
 
 /// The elements of a drawing.
@@ -110,6 +126,7 @@ struct Drawing {
     path: PathBuf,
     text: String,
     layers: Vec<Layer>,
+    cuts: Cuts,
     notes: Vec<String>,
     options: Options,
 }
@@ -117,7 +134,7 @@ struct Drawing {
 impl Drawing {
     /// Renders it, and calls `advance` after each layer.
     fn draw(self, advance: &dyn Fn()) -> Result<Artwork, Diagnosis> {
-        let Drawing { path, text, layers, mut notes, options } = self;
+        let Drawing { path, text, layers, cuts, mut notes, options } = self;
         let path = path.as_path();
         let document = parsed(path, &text)?;
         let root = document.root_element();
@@ -129,9 +146,21 @@ impl Drawing {
                 path.display()
             ));
         }
-        let renderer = Renderer::new(path, text || links_drawing(root))?;
-        let whole = write::written(root, |_| Way::Keep);
-        let size = renderer.size(&whole)?;
+        let measure = units::measure(root);
+        let renderer = Renderer::new(path, text || links_drawing(root), measure.per_inch)?;
+        let widths = strokes::widths(root, |text| renderer.tree(text))?;
+        // Some programs ask for soft edges, which are neither ink nor paper.
+        let own = root.attribute("style").unwrap_or_default();
+        let crisp =
+            format!("shape-rendering:crispEdges!important;text-rendering:optimizeSpeed!important;{own}");
+        let way = |node: nodes::Node<'_, '_>| match widths.get(&node.id()) {
+            _ if node == root => Way::With(vec![("style", crisp.clone())]),
+            _ if cuts.contains(&node.id()) => Way::Hide,
+            Some(width) => Way::With(width.clone()),
+            None => Way::Keep,
+        };
+        let whole = write::written(root, way);
+        let size = renderer.tree(&whole)?.size();
         if let Some(missing) = renderer.missing_fonts() {
             notes.push(format!(
                 "{}: this computer has no font {missing}; install it, or convert the text to paths",
@@ -139,11 +168,25 @@ impl Drawing {
             ));
         }
         let (across, down) = (f64::from(size.width()), f64::from(size.height()));
-        let unstated = Unstated::Drawing { rounded_mm: 0.0 };
-        let dots = size::dots(path, (across, down), Some((UNITS, UNITS)), unstated, &options, &mut notes)?;
+        let (stated, unstated) = match measure.assumed {
+            None => (Some((measure.per_inch, measure.per_inch)), Unstated::Drawing { rounded_mm: 0.0 }),
+            Some(units) => (None, Unstated::Units(units)),
+        };
+        let dots = size::dots(path, (across, down), stated, unstated, &options, &mut notes)?;
         let scale = Transform::from_scale((dots.0 as f64 / across) as f32, (dots.1 as f64 / down) as f32);
         let size = (dots.0 as u32, dots.1 as u32);
 
+        let mut cut = None;
+        if options.cut_lines && !cuts.is_empty() {
+            let layer = [Layer::of_cuts(&cuts, &document)];
+            let mut only = find::only(&layer, 0, false);
+            let shape = |node: nodes::Node<'_, '_>| {
+                only(node).and(widths.get(&node.id()).cloned().map_or(Way::Keep, Way::With))
+            };
+            let drawn = renderer.parsed(&write::written(root, shape), Without::Pictures)?;
+            let rgba = renderer.rendered(&drawn, scale, size)?;
+            cut = Some(rgba.as_chunks::<4>().0.iter().map(|pixel| pixel[3]).collect::<Vec<u8>>());
+        }
         if layers.is_empty() {
             let drawn = renderer.parsed(&whole, Without::Nothing)?;
             let rgba = renderer.rendered(&drawn, scale, size)?;
@@ -156,11 +199,15 @@ impl Drawing {
             let pixels = svg_kinds::tagged(&rgba, no_text.as_deref(), no_pictures.as_deref());
             let mut art = picture::tagged_artwork(&stem(path), size, dots, pixels, &options);
             art.notes.splice(..0, notes);
+            cut.iter().for_each(|cut| art.add_cut(cut));
             return Ok(art);
         }
         let mut art = Artwork::blank(&stem(path), dots);
+        cut.iter().for_each(|cut| art.add_cut(cut));
         for (at, layer) in layers.iter().enumerate() {
-            let text = write::written(root, find::only(&layers, at));
+            let toned = options.tones.contains(layer.named.ink);
+            let mut only = find::only(&layers, at, toned);
+            let text = write::written(root, |node| only(node).and(way(node)));
             let drawn = renderer.parsed(&text, Without::Nothing)?;
             let rgba = renderer.rendered(&drawn, scale, size)?;
             advance();
@@ -173,7 +220,15 @@ impl Drawing {
                 notes.push(format!("{}: layer `{name}` {why}", path.display()));
                 continue;
             }
-            let scan = if options.tones.contains(layer.named.ink) {
+            if let (Some(opacity), false) = (layer.opacity, toned) {
+                notes.push(format!(
+                    "{}: layer `{}` is shown at {:.0} % opacity, which ink does not have: printed in full",
+                    path.display(),
+                    layer.label,
+                    100.0 * opacity
+                ));
+            }
+            let scan = if toned {
                 Scan::of_drawing(path, size, &rgba)
             } else if drawn.pictures {
                 let shapes = renderer.parsed(&text, Without::Pictures)?;

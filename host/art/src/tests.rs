@@ -3,14 +3,18 @@
 use std::fs;
 use std::path::PathBuf;
 
+mod archives;
 mod damage;
 mod documents;
 mod drawings;
+mod exports;
 mod files;
+mod hostile;
 mod layered;
 mod pages;
 mod pictures;
 mod plates;
+mod programs;
 mod sizes;
 mod thin;
 mod turned;

@@ -241,7 +241,7 @@ fn channels(
 
 /// Names of all inks: consecutive texts that end in NUL. The decoder itself stops at the first.
 fn ink_names(bytes: &[u8]) -> Vec<String> {
-    let text = field(bytes, INK_NAMES).and_then(|field| bytes.get(field)).unwrap_or_default();
+    let text = tiff_pages::field(bytes, INK_NAMES).and_then(|field| bytes.get(field)).unwrap_or_default();
     let names = text.split(|&byte| byte == 0).map(|name| String::from_utf8_lossy(name).trim().to_owned());
     names.filter(|name| !name.is_empty()).collect()
 }
@@ -298,38 +298,24 @@ fn unicode_strings(mut data: &[u8]) -> Vec<String> {
 }
 
 /// Marks the first image as greyscale, so that the decoder returns all of its channels.
-fn set_photometric(bytes: &mut [u8]) {
+pub(super) fn set_photometric(bytes: &mut [u8]) {
     let grey =
         if bytes.starts_with(b"II") { BLACK_IS_ZERO.to_le_bytes() } else { BLACK_IS_ZERO.to_be_bytes() };
     // The decoder refuses a file without the field.
     if let Some(value) =
-        field(bytes, PHOTOMETRIC).filter(|f| f.len() == 2).and_then(|field| bytes.get_mut(field))
+        tiff_pages::field(bytes, PHOTOMETRIC).filter(|f| f.len() == 2).and_then(|field| bytes.get_mut(field))
     {
         value.copy_from_slice(&grey);
     }
 }
 
-/// The place of a tag's value in the first image, for values of bytes and 16-bit numbers.
-fn field(bytes: &[u8], tag: u16) -> Option<std::ops::Range<usize>> {
-    let little = bytes.starts_with(b"II");
-    let short = |at: usize| -> Option<u16> {
-        let two = *bytes.get(at..)?.first_chunk::<2>()?;
-        Some(if little { u16::from_le_bytes(two) } else { u16::from_be_bytes(two) })
-    };
-    let long = |at: usize| -> Option<usize> {
-        let four = *bytes.get(at..)?.first_chunk::<4>()?;
-        Some(if little { u32::from_le_bytes(four) } else { u32::from_be_bytes(four) } as usize)
-    };
-    let start = long(4)?;
-    let entry =
-        (0..usize::from(short(start)?)).map(|i| start + 2 + 12 * i).find(|&at| short(at) == Some(tag))?;
-    let length = long(entry + 4)?.checked_mul(if short(entry + 2)? == 3 { 2 } else { 1 })?;
-    let at = if length <= 4 { entry + 8 } else { long(entry + 8)? };
-    Some(at..at.checked_add(length)?)
-}
-
 /// One byte a pixel for each channel.
-fn planes(path: &Path, bytes: &[u8], samples: usize, pixels: usize) -> Result<Vec<Vec<u8>>, Diagnosis> {
+pub(super) fn planes(
+    path: &Path,
+    bytes: &[u8],
+    samples: usize,
+    pixels: usize,
+) -> Result<Vec<Vec<u8>>, Diagnosis> {
     let bad = |error: ::tiff::TiffError| {
         wrong(path, format!("cannot decode its channels: {error}"))
             .hint("save it uncompressed or with LZW, 8 or 16 bits")

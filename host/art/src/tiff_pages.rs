@@ -5,8 +5,9 @@
 //! Method: the directories are followed from the header, without those that say they are a small copy or a mask. To
 //! read another page than the first, the header in memory is pointed at its directory. Cost: none to speak of.
 //! Limits: [`MOST_PAGES`]; pages are not looked at, so a blank one counts.
-//! Source: TIFF 6.0, sections 2 and 8.
+//! Source: TIFF 6.0, sections 2 and 8; the BigTIFF proposal for places of eight bytes.
 
+use std::ops::Range;
 use std::path::Path;
 
 use super::error::{several_pages, wrong};
@@ -16,13 +17,25 @@ use observe::Diagnosis;
 const NEW_SUBFILE_TYPE: u16 = 254;
 const SUBFILE_TYPE: u16 = 255;
 
-/// Numbers of a TIFF in its own byte order.
+/// Whether these are the first bytes of a TIFF, or of one with places of eight bytes (BigTIFF).
+pub(super) fn is_tiff(start: &[u8]) -> bool {
+    [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"].iter().any(|magic| start.starts_with(*magic))
+}
+
+/// The numbers of a TIFF in its own byte order, and the form of its directories.
 struct Numbers<'a> {
     bytes: &'a [u8],
     little: bool,
+    /// Whether places and counts have eight bytes.
+    big: bool,
 }
 
 impl Numbers<'_> {
+    fn of(bytes: &[u8]) -> Numbers<'_> {
+        let big = bytes.get(2..4).is_some_and(|magic| magic.contains(&b'+'));
+        Numbers { bytes, little: bytes.starts_with(b"II"), big }
+    }
+
     fn short(&self, at: usize) -> Option<u16> {
         let two = *self.bytes.get(at..)?.first_chunk::<2>()?;
         Some(if self.little { u16::from_le_bytes(two) } else { u16::from_be_bytes(two) })
@@ -33,29 +46,72 @@ impl Numbers<'_> {
         Some(if self.little { u32::from_le_bytes(four) } else { u32::from_be_bytes(four) })
     }
 
+    /// A place or a count.
+    fn place(&self, at: usize) -> Option<usize> {
+        if !self.big {
+            return Some(self.long(at)? as usize);
+        }
+        let eight = *self.bytes.get(at..)?.first_chunk::<8>()?;
+        let place = if self.little { u64::from_le_bytes(eight) } else { u64::from_be_bytes(eight) };
+        usize::try_from(place).ok()
+    }
+
+    /// Where the place of the first directory is.
+    fn first(&self) -> usize {
+        if self.big { 8 } else { 4 }
+    }
+
+    /// Where the entries of a directory are, and where the place of the next directory is.
+    fn entries(&self, directory: usize) -> Option<(impl Iterator<Item = usize>, usize)> {
+        let (count, head, size) = match self.big {
+            true => (self.place(directory)?, 8, 20),
+            false => (self.short(directory)?.into(), 2, 12),
+        };
+        let begin = directory.checked_add(head)?;
+        let end = count.checked_mul(size)?.checked_add(begin)?;
+        Some(((begin..end.min(self.bytes.len())).step_by(size), end))
+    }
+
+    /// Where an entry has its value, or the place of it.
+    fn value(&self, entry: usize) -> usize {
+        if self.big { entry + 12 } else { entry + 8 }
+    }
+
     /// Whether a directory is that of a small copy or a mask of another picture.
-    fn is_copy(&self, directory: usize, entries: usize) -> bool {
-        (0..entries).map(|entry| directory + 2 + 12 * entry).any(|at| match self.short(at) {
+    fn is_copy(&self, mut entries: impl Iterator<Item = usize>) -> bool {
+        entries.any(|at| match self.short(at) {
             // Bit 0 means a copy, bit 2 a mask.
-            Some(NEW_SUBFILE_TYPE) => self.long(at + 8).is_some_and(|kind| kind & 0b101 != 0),
-            Some(SUBFILE_TYPE) => self.short(at + 8) == Some(2),
+            Some(NEW_SUBFILE_TYPE) => self.long(self.value(at)).is_some_and(|kind| kind & 0b101 != 0),
+            Some(SUBFILE_TYPE) => self.short(self.value(at)) == Some(2),
             _ => false,
         })
     }
 }
 
+/// The place of a tag's value in the first picture, for values of bytes and 16-bit numbers.
+pub(super) fn field(bytes: &[u8], tag: u16) -> Option<Range<usize>> {
+    let numbers = Numbers::of(bytes);
+    let (mut entries, _) = numbers.entries(numbers.place(numbers.first())?)?;
+    let entry = entries.find(|&at| numbers.short(at) == Some(tag))?;
+    let each = if numbers.short(entry + 2)? == 3 { 2 } else { 1 };
+    let length = numbers.place(entry + 4)?.checked_mul(each)?;
+    let own = numbers.value(entry);
+    let at = if length <= (if numbers.big { 8 } else { 4 }) { own } else { numbers.place(own)? };
+    Some(at..at.checked_add(length)?)
+}
+
 /// Places of the directories of the pages. Empty if the file is damaged, which the decoder says better.
 fn directories(bytes: &[u8]) -> Vec<usize> {
-    let numbers = Numbers { bytes, little: bytes.starts_with(b"II") };
+    let numbers = Numbers::of(bytes);
     let (mut pages, mut copies) = (Vec::new(), Vec::new());
-    let mut next = numbers.long(4);
-    while let Some(directory) = next.map(|at| at as usize).filter(|&at| at != 0) {
+    let mut next = numbers.place(numbers.first());
+    while let Some(directory) = next.filter(|&at| at != 0) {
         // A ring of directories ends where it began.
         if pages.contains(&directory) || copies.contains(&directory) {
             break;
         }
-        let Some(entries) = numbers.short(directory).map(usize::from) else { break };
-        if numbers.is_copy(directory, entries) {
+        let Some((entries, after)) = numbers.entries(directory) else { break };
+        if numbers.is_copy(entries) {
             copies.push(directory);
         } else {
             pages.push(directory);
@@ -63,7 +119,7 @@ fn directories(bytes: &[u8]) -> Vec<usize> {
         if pages.len() + copies.len() > MOST_PAGES as usize {
             break;
         }
-        next = numbers.long(directory + 2 + 12 * entries);
+        next = numbers.place(after);
     }
     if pages.is_empty() { copies } else { pages }
 }
@@ -94,10 +150,15 @@ pub(super) fn choose(path: &Path, bytes: &mut [u8], page: Option<u32>) -> Result
         let (number, pages) = (page.unwrap_or_default(), pages.len());
         return Err(wrong(path, format!("there is no page {number}; the file has {pages}")));
     };
-    // Every place was read as a number of four bytes.
-    let place = directory as u32;
-    let place = if bytes.starts_with(b"II") { place.to_le_bytes() } else { place.to_be_bytes() };
-    bytes[4..8].copy_from_slice(&place);
+    // Every place was read as a number of so many bytes.
+    let Numbers { little, big, .. } = Numbers::of(bytes);
+    let (low, high) = ((directory as u32).to_le_bytes(), (directory as u64).to_le_bytes());
+    let mut place = if big { high.to_vec() } else { low.to_vec() };
+    if !little {
+        place.reverse();
+    }
+    let first = Numbers::of(bytes).first();
+    bytes[first..first + place.len()].copy_from_slice(&place);
     Ok(())
 }
 
@@ -133,13 +194,33 @@ mod tests {
         assert_eq!(bytes[4..8], [0, 0, 0, 26]);
     }
 
+    #[test]
+    fn places_of_eight_bytes_are_followed_too() {
+        let mut bytes = b"II+\0\x08\0\0\0\x10\0\0\0\0\0\0\0".to_vec();
+        for (tag, next) in [(254u16, 52u64), (262, 0)] {
+            bytes.extend(1u64.to_le_bytes());
+            bytes.extend(tag.to_le_bytes());
+            bytes.extend([3, 0]);
+            bytes.extend(1u64.to_le_bytes());
+            bytes.extend(1u64.to_le_bytes());
+            bytes.extend(next.to_le_bytes());
+        }
+        // The first is a copy of the second.
+        assert_eq!(directories(&bytes), [52]);
+        choose(Path::new("a.tif"), &mut bytes, None).unwrap();
+        assert_eq!((bytes[8], field(&bytes, 262)), (52, Some(72..74)));
+    }
+
     proptest! {
         #[test]
         fn any_bytes_have_pages_or_none(bytes in prop::collection::vec(any::<u8>(), 8..200), page in prop::option::of(any::<u32>())) {
-            let mut bytes = [b"II*\0", &bytes[..]].concat();
-            let length = bytes.len();
-            let _ = choose(Path::new("a.tif"), &mut bytes, page);
-            prop_assert_eq!(bytes.len(), length);
+            for magic in [b"II*\0", b"MM\0+"] {
+                let mut bytes = [magic, &bytes[..]].concat();
+                let length = bytes.len();
+                let _ = choose(Path::new("a.tif"), &mut bytes, page);
+                let _ = field(&bytes, 262);
+                prop_assert_eq!(bytes.len(), length);
+            }
         }
     }
 }

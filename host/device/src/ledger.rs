@@ -16,6 +16,7 @@ use std::io::{self, BufRead as _, BufReader, Read as _, Seek as _, SeekFrom, Wri
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use crate::printers::Printers;
 use files::durable;
 use press::job::cost::{Cost, Price};
 use protocol::ink::Ink;
@@ -123,12 +124,21 @@ pub struct Ledger {
     folder: PathBuf,
     /// This user's file.
     path: PathBuf,
+    /// Another folder whose lines count: the one that was this computer's before.
+    other: Option<PathBuf>,
 }
 
 impl Ledger {
     /// The ledger in this folder.
     pub fn in_folder(folder: &Path) -> Ledger {
-        Ledger { folder: folder.to_path_buf(), path: folder.join(format!("{PREFIX}{}.jsonl", user())) }
+        let path = folder.join(format!("{PREFIX}{}.jsonl", user()));
+        Ledger { folder: folder.to_path_buf(), path, other: None }
+    }
+
+    /// The ledger beside what is known of printers. What this user printed before there was a folder that all users share, and
+    /// what others print where it cannot be written, counts as well.
+    pub fn of(printers: &Printers) -> Ledger {
+        Ledger { other: printers.other().map(Path::to_path_buf), ..Ledger::in_folder(printers.folder()) }
     }
 
     /// This user's file.
@@ -195,11 +205,15 @@ impl Ledger {
 
     /// All lines of all users that can be read, oldest first, and how many cannot be read.
     pub fn lines(&self) -> Result<(Vec<Line>, usize), LedgerError> {
-        let listing = match fs::read_dir(&self.folder) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok((Vec::new(), 0)),
-            listing => listing.map_err(self.error("read"))?,
-        };
-        let mut paths: Vec<PathBuf> = listing
+        let mut found = Vec::new();
+        for folder in self.other.iter().chain([&self.folder]) {
+            match fs::read_dir(folder) {
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                listing => found.extend(listing.map_err(self.error("read"))?),
+            }
+        }
+        let mut paths: Vec<PathBuf> = found
+            .into_iter()
             .filter_map(|item| Some(item.ok()?.path()))
             .filter(|path| {
                 let name = path.file_name().and_then(|name| name.to_str());
@@ -368,6 +382,32 @@ mod tests {
         // It goes on and is printed: what was counted as lost is part of the whole.
         ledger.append(printed("b", 2200, true)).unwrap();
         assert_eq!(of(&ledger, Ink::White), Some((800.0, 2, 0)));
+    }
+
+    #[test]
+    fn what_was_counted_in_the_folder_before_still_counts() {
+        let (before, now) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let old = Ledger::in_folder(before.path());
+        old.append(Event::Price {
+            ink: "white".into(),
+            amount: 12.0,
+            currency: "EUR".into(),
+            ribbon_mm: Some(2e4),
+        })
+        .unwrap();
+        old.append(job("a", vec![pass(Ink::White, 0, 9, 10.0)])).unwrap();
+        old.append(printed("a", 9, true)).unwrap();
+        let ledger = Ledger { other: Some(before.path().into()), ..Ledger::in_folder(now.path()) };
+        ledger.append(job("b", vec![pass(Ink::White, 0, 9, 20.0)])).unwrap();
+        ledger.append(printed("b", 9, true)).unwrap();
+        assert_eq!(of(&ledger, Ink::White), Some((30.0, 2, 0)));
+        assert_eq!(prices(&ledger.lines().unwrap().0, |_| None).len(), 1);
+        assert_eq!(of(&Ledger::in_folder(now.path()), Ink::White), Some((20.0, 1, 0)));
+        // A new cartridge is written where the computer's ledger is now, and counts for both.
+        ledger.append(Event::New { ink: "white".into() }).unwrap();
+        assert_eq!(of(&ledger, Ink::White).map(|(mm, ..)| mm), Some(0.0));
+        let gone = Ledger { other: Some(before.path().join("none")), ..ledger };
+        assert_eq!(gone.lines().unwrap().0.len(), 3);
     }
 
     #[test]

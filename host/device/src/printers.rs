@@ -152,6 +152,13 @@ pub struct Printers {
     folder: PathBuf,
     /// The folder all users share, if this is not it.
     instead_of: Option<PathBuf>,
+    /// The folder of this user's own, if this is not it.
+    own: Option<PathBuf>,
+}
+
+/// The folder of a user's own.
+fn own_folder(journal: &Journal) -> PathBuf {
+    journal.folder().join("printers")
 }
 
 impl Printers {
@@ -165,21 +172,27 @@ impl Printers {
         if let Some(folder) = &shared
             && tempfile::Builder::new().prefix(".try.").tempfile_in(folder).is_ok()
         {
-            return Ok(Printers { folder: folder.clone(), instead_of: None });
+            let own = Journal::of_user().ok().map(|journal| own_folder(&journal));
+            return Ok(Printers { folder: folder.clone(), instead_of: None, own });
         }
-        let own = Printers::at(&Journal::of_user()?.folder().join("printers"))?;
+        let own = Printers::at(&own_folder(&Journal::of_user()?))?;
         Ok(Printers { instead_of: shared, ..own })
     }
 
     /// The facts in this folder, which is made if need be.
     pub fn at(folder: &Path) -> Result<Printers, PrintersError> {
         durable::make_folder(folder).map_err(io_error("make", folder))?;
-        Ok(Printers { folder: folder.to_path_buf(), instead_of: None })
+        Ok(Printers { folder: folder.to_path_buf(), instead_of: None, own: None })
     }
 
     /// Where they are.
     pub fn folder(&self) -> &Path {
         &self.folder
+    }
+
+    /// The folder that would be in its place if that of all users could be written, or could not.
+    pub(crate) fn other(&self) -> Option<&Path> {
+        self.own.as_deref().or(self.instead_of.as_deref())
     }
 
     /// What the user should know when the facts are not shared.

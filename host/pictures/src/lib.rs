@@ -6,6 +6,7 @@
 //! caller's own limits come before anything of that size is allocated; then it is decoded.
 //! Cost: the bytes of the file in memory beside its pixels. Limits: see each format; of an animation the first picture.
 
+mod chunks;
 mod exr;
 pub mod resolution;
 
@@ -13,12 +14,14 @@ use std::io::Cursor;
 
 use image::codecs::hdr::HdrDecoder;
 use image::codecs::png::PngEncoder;
+use image::error::{DecodingError, ImageError};
 use image::metadata::Orientation;
 use image::{
     ColorType, DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageFormat, ImageReader,
     ImageResult, Limits,
 };
 
+pub use chunks::{MOST_PROFILE, gamma};
 pub use exr::{Floats, exr, exr_sizes};
 
 /// What a decoder may use.
@@ -70,6 +73,10 @@ impl Opened<'_> {
 /// # Errors
 /// A damaged file, a kind of pixels that is not decoded, or a larger picture than allowed.
 pub fn open(bytes: &[u8], format: ImageFormat, bounds: Bounds) -> ImageResult<Opened<'_>> {
+    if format == ImageFormat::Png && !chunks::has_plain_profile(bytes) {
+        let problem = format!("its colour profile expands to more than {} MB", MOST_PROFILE >> 20);
+        return Err(ImageError::Decoding(DecodingError::new(format.into(), problem)));
+    }
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     reader.limits(limits(bounds));
     Ok(Opened { decoder: Box::new(reader.into_decoder()?) })

@@ -20,7 +20,7 @@ pub mod document;
 use inks::{Certainty, InkSet, Library, Severity};
 use protocol::ink::Kind;
 use protocol::paper::Paper;
-use protocol::rgl::{FoilConsent, Page, Resolution};
+use protocol::rgl::{FoilConsent, Media, Page, Resolution};
 use protocol::walk::Frame;
 
 use crate::job::Handling;
@@ -117,6 +117,7 @@ pub fn draft(request: &Request<'_>, observer: &dyn Observer) -> Result<Draft, Jo
     let separation = separate_page(&sheet, &laid, library, observer)?;
     let mut separation = separation;
     separation.checks.splice(..0, wrong_resolution(layout, &separation.passes));
+    separation.checks.splice(..0, untried(request.handling.media));
     let page = Page { resolution: layout.resolution, ..request.handling.page(layout.paper) };
     let plan = Plan::new(&Subject::new(name, &sheet, &laid, &separation, &page, layout.mirror), library);
     Ok(Draft { sheet, laid, separation, plan })
@@ -135,6 +136,19 @@ pub fn job(request: &Request<'_>, observer: &dyn Observer) -> Result<Job, JobErr
     let bytes = encoded(page, passes, &request.allowed, observer)?;
     let frame = layout::frame(request.dots.width(), request.dots.length(), request.layout)?;
     Ok(Job { draft, page, frame, bytes })
+}
+
+/// What forbids media for which the printer may expect rows of another kind ([the language](../../../docs/rgl.md#media)).
+fn untried(media: Media) -> Option<Check> {
+    matches!(media, Media::VPhotoFilm | Media::VPhotoCard).then(|| Check {
+        rule: "vphoto".into(),
+        severity: Severity::Error,
+        certainty: Certainty::Inferred,
+        text: "VPhoto media may switch the printer to rows of four bits a dot, which nobody has tried; choose another medium, such as \
+               glossy-paper"
+            .into(),
+        stacks: Vec::new(),
+    })
 }
 
 /// What forbids passes at another resolution than 600 dpi: the printer takes the pitch of a dot from the cartridge.

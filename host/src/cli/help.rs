@@ -26,6 +26,8 @@ const FIRST: &[(&str, &[&str])] = &[
     ("chart halftone", &["library", "paper", "at", "repeat", "media", "profile", "output", "to"]),
     ("chart registration", &["inks", "paper", "media", "output", "to", "yes", "copies", "json"]),
     ("chart calibration", &["ink", "paper", "media", "output", "to", "yes", "copies", "json"]),
+    ("chart first", &["ink", "paper", "media", "output", "to", "yes", "copies", "json"]),
+    ("chart heads", &["inks", "paper", "media", "output", "to", "yes", "copies", "json"]),
     ("layout", &["paper", "at", "repeat", "gap", "mirror", "crop-marks", "profile", "output"]),
     ("map", &["inks", "intent", "metric", "library", "trust", "document", "seed", "output"]),
 ];
@@ -67,7 +69,7 @@ const GROUPS: &[(&str, &[&str])] = &[
     ),
     ("View", &["light-probe", "distance", "middle", "seen-from", "tilt", "exposure", "tone-curve"]),
     ("Worn printer", &["registration-error", "feed-error", "missing-dots", "wear-seed", "dot-gain"]),
-    ("Result", &["preset", "probe", "background", "output", "json"]),
+    ("Result", &["preset", "probe", "background", "output", "cut-lines", "json"]),
     ("Sending", &["to", "copies", "force", "yes"]),
 ];
 

@@ -33,6 +33,7 @@ use art::process::MOST_PAGES;
 use drawing::Drawing;
 use observe::{Diagnosis, Fault, Observer};
 use page::Press;
+use press::layout::Cut;
 use press::pipeline::JobError;
 
 /// The largest document.
@@ -84,6 +85,17 @@ pub enum FilterError {
         length: f64,
         /// Why the printer does not take it.
         problem: String,
+    },
+    /// Nothing to print, though something is drawn.
+    #[error(
+        "there is nothing to print: everything on page {page} lies on the margins, where the printer cannot print ({beyond}); move it \
+         further in, or print it in the middle of the sheet with FoilpressPosition=Centre"
+    )]
+    Margins {
+        /// Page, from 1.
+        page: usize,
+        /// How far it lies beyond what can be printed.
+        beyond: Cut,
     },
     /// Foil without consent.
     #[error(
@@ -160,7 +172,7 @@ pub fn run(
         io::ErrorKind::UnexpectedEof => FilterError::Empty,
         _ => io_error("read the document")(error),
     })?;
-    let mut press = Press { choices, library, out, observer, jobs: 0, white: 0 };
+    let mut press = Press { choices, library, out, observer, jobs: 0, white: 0, in_margins: None };
     if head == raster::SYNC {
         pictures(document, &mut press)?;
     } else if head.starts_with(b"%PDF") || head.starts_with(b"%!") {
@@ -173,7 +185,10 @@ pub fn run(
     }
     press.out.flush().map_err(io_error("write the job"))?;
     press.without_white();
-    Ok(press.jobs)
+    match press.in_margins {
+        Some((page, beyond)) if press.jobs == 0 => Err(FilterError::Margins { page, beyond }),
+        _ => Ok(press.jobs),
+    }
 }
 
 /// A document as a file, which Ghostscript would make of it, too.

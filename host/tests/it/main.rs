@@ -9,6 +9,7 @@ mod compare;
 mod display;
 mod edit;
 mod escapes;
+mod exports;
 mod layers;
 mod libraries;
 #[cfg(unix)]

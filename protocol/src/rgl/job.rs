@@ -338,6 +338,12 @@ mod tests {
         assert_eq!(a4(&five).mode(), Mode::MultiPlane);
         let bytes = stream(a4(&five), 1, &vec![vec![]; 5]).unwrap();
         assert!(commands(&bytes).contains(&Command::Cartridges(Cartridges::new(&five).unwrap())));
+        // The list has an entry for each pass while there is room for them.
+        let listed = |passes: &[Ink]| a4(passes).cartridges().map(|list| list.inks().to_vec());
+        let twice = [&five[..], &[Ink::Finish]].concat();
+        assert_eq!(listed(&twice), Some(twice.clone()));
+        let eight = [&five[..], &[Ink::Finish; 3]].concat();
+        assert_eq!(listed(&eight), Some(five.clone()));
         let seven_of_four =
             [Ink::Black, Ink::Primer, Ink::Finish, Ink::Primer, Ink::White, Ink::White, Ink::White];
         assert_eq!(a4(&seven_of_four).mode(), Mode::ColourPlane);

@@ -77,7 +77,8 @@ pub struct JobSetup {
 
 impl JobSetup {
     /// A job of these passes, in printing order. With up to four cartridges the mode is colourPlane; with five to seven it
-    /// is multiPlane with a list of them in the order of first use. An ink in several passes counts once.
+    /// is multiPlane with a list. That has an entry for each pass, repeats kept, as the driver's has; if there are more passes than
+    /// entries, one for each cartridge in the order of first use.
     ///
     /// Errors: [`Fault::NoPasses`], [`Fault::TooManyPasses`], [`Fault::TooManyCartridges`], [`Fault::SpotResolution`],
     /// [`Fault::FoilWithoutConsent`], [`Fault::PageSize`].
@@ -101,7 +102,7 @@ impl JobSetup {
         }
         let (mode, cartridges) = match cartridges.len() {
             0..=4 => (Mode::ColourPlane, None),
-            _ => (Mode::MultiPlane, Cartridges::new(&cartridges)),
+            _ => (Mode::MultiPlane, Cartridges::new(&passes).or_else(|| Cartridges::new(&cartridges))),
         };
         Ok(JobSetup { page, mode, cartridges, passes })
     }

@@ -21,6 +21,10 @@ pub enum Accept {
     EvenWhite,
     /// Three passes of white instead of one.
     WhiteThrice,
+    /// White beneath the colours that are drawn over it.
+    WhiteKept,
+    /// Metallic silver beneath white.
+    SilverUnderWhite,
 }
 
 /// The change of a setting that follows a suggestion.
@@ -60,6 +64,9 @@ pub(super) fn suggest(stacks: &[Stack], dots: &[u64], order: &[Ink]) -> Vec<Sugg
     });
     let white_on_black = about(&|layers| layers.windows(2).any(|pair| pair == [Ink::Black, Ink::White]));
     let thin_white = about(&|layers| layers.iter().filter(|&&ink| ink == Ink::White).count() == 1);
+    let bare_white = about(&|layers| {
+        layers.first() == Some(&Ink::White) && layers.iter().filter(|&&ink| ink == Ink::White).count() == 1
+    });
     let primed = about(&|layers| layers.contains(&Ink::Primer));
     let metal = |layers: &[Ink]| layers.iter().position(|ink| ink.kind() == Kind::Metallic);
     let metals = about(&|layers| metal(layers).is_some());
@@ -83,6 +90,11 @@ pub(super) fn suggest(stacks: &[Stack], dots: &[u64], order: &[Ink]) -> Vec<Sugg
         ),
         (thin_white, "one pass of white looks grey; three look nearly white", Remedy::Accept(Accept::WhiteThrice)),
         (
+            bare_white,
+            "on a dark ground, metallic silver beneath white hides it like several whites, as owners report",
+            Remedy::Accept(Accept::SilverUnderWhite),
+        ),
+        (
             primed,
             "the media settings for plain paper can tear the primer ribbon; those for cardboard prevent it",
             Remedy::Media(Media::Cardboard),
@@ -97,6 +109,12 @@ pub(super) fn suggest(stacks: &[Stack], dots: &[u64], order: &[Ink]) -> Vec<Sugg
     .filter(|(dots, ..)| *dots > 0)
     .map(|(dots, text, remedy)| Suggestion { text: text.into(), remedy, dots })
     .collect()
+}
+
+/// A suggestion on white that colours knock out, if they do.
+pub(super) fn knocked_out(dots: u64) -> Option<Suggestion> {
+    let text = "the colours knock out the white beneath them, as layout programs do unless they are told to overprint; keep the white";
+    (dots > 0).then(|| Suggestion { text: text.into(), remedy: Remedy::Accept(Accept::WhiteKept), dots })
 }
 
 /// Suggestions to leave out inks that plain colour needs on so few dots that nobody would miss them.

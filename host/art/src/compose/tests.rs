@@ -170,6 +170,24 @@ fn undercoats_are_suggested_and_laid_only_when_accepted() {
 }
 
 #[test]
+fn silver_goes_beneath_bare_white_when_it_is_accepted() {
+    let art = art(&[(Ink::White, &["##."]), (Cyan, &[".##"])]);
+    let plain = composed(&art, &with(|s| s.order = Order::Given));
+    assert_eq!(dots(&plain), ["W", "W+C", "C"]);
+    let remedy = Remedy::Accept(Accept::SilverUnderWhite);
+    assert!(plain.suggestions.iter().any(|s| s.remedy == remedy && s.dots == 2), "{:?}", plain.suggestions);
+    let accepted = composed(
+        &art,
+        &with(|s| {
+            s.order = Order::Given;
+            s.accept = vec![Accept::SilverUnderWhite];
+        }),
+    );
+    assert_eq!(dots(&accepted), ["MS+W", "MS+W+C", "C"]);
+    assert!(accepted.suggestions.iter().all(|s| s.remedy != remedy));
+}
+
+#[test]
 fn impossible_settings_are_reported() {
     let two = art(&[(Black, &["#"]), (Cyan, &["#"])]);
     assert_eq!(dots(&composed(&two, &with(|s| s.inks = InkSet::of([Black])))), ["K"]);

@@ -66,6 +66,15 @@ pub const OLDER: &str = "the document has gradients that this version of Ghostsc
     them; it draws some, such as narrow stripes, wrong or not at all; where it does, save the page as a \
     picture (PNG) and print that";
 
+/// What the decoder of JBIG2 says of a picture that it gives up.
+const JBIG2: &str = "jbig2dec FATAL ERROR";
+
+/// The families that every reader has a stand-in for: those of the standard.
+const STANDARD: [&str; 5] = ["Helvetica", "Times", "Courier", "Symbol", "ZapfDingbats"];
+
+/// The most fonts that a note names.
+const FONTS: usize = 8;
+
 /// The longest quote, in characters.
 const LONGEST: usize = 120;
 
@@ -119,6 +128,7 @@ impl Complaints<'_> {
                     found.other = found.other.or(Some(item).filter(|_| other));
                 }
                 _ if line.starts_with(UNNAMED) => found.other = found.other.or(Some(UNNAMED)),
+                _ if line.starts_with(JBIG2) => found.other = found.other.or(Some(line)),
                 _ => {
                     let error = line.split_once("**** Error").map(|(_, text)| text);
                     let error = error.filter(|text| text.starts_with([':', ' ']));
@@ -128,6 +138,60 @@ impl Complaints<'_> {
         }
         found
     }
+}
+
+/// A note on fonts that were replaced because neither the document nor the computer has them.
+#[must_use]
+pub fn replaced_fonts(said: &str) -> Option<String> {
+    let mut found: Vec<String> = Vec::new();
+    let mut count = 0;
+    for (font, stand_in) in said.lines().filter_map(replaced) {
+        let named =
+            quote(font.split_once('+').filter(|(tag, _)| tag.len() == 6).map_or(font, |(_, name)| name));
+        let letters =
+            |name: &str| name.chars().filter(|c| c.is_alphanumeric()).collect::<String>().to_lowercase();
+        let family = named.split('-').next().unwrap_or_default();
+        if STANDARD.contains(&family) || stand_in.is_some_and(|other| letters(other) == letters(&named)) {
+            continue;
+        }
+        let stand_in = stand_in.map_or(String::new(), |other| format!(" (drawn in {})", quote(other)));
+        let text = format!("{named}{stand_in}");
+        let known = |part: &String| {
+            *part == text || part.strip_prefix(&named).is_some_and(|rest| rest.starts_with(" ("))
+        };
+        if !found.iter().any(known) {
+            count += 1;
+            if found.len() < FONTS {
+                found.push(text);
+            }
+        }
+    }
+    if count > found.len() {
+        found.push(format!("and {} more", count - found.len()));
+    }
+    (count > 0).then(|| {
+        format!(
+            "text is not drawn in its font, because neither the document nor this computer has it: {}; embed the font, or convert the \
+             text to paths",
+            found.join(", ")
+        )
+    })
+}
+
+/// The font that a line says was replaced, and what with.
+fn replaced(line: &str) -> Option<(&str, Option<&str>)> {
+    if let Some(font) = line.strip_prefix("%%NoFont: ") {
+        return Some((font.trim(), None));
+    }
+    if let Some(rest) = line.strip_prefix("Substituting font ") {
+        let (stand_in, font) = rest.split_once(" for ")?;
+        return Some((font.trim_end_matches('.'), Some(stand_in)));
+    }
+    let rest = line.strip_prefix("Loading font ").or_else(|| line.strip_prefix("Loading CIDFont "))?;
+    let (font, file) =
+        rest.split_once(" (or substitute) from ").or_else(|| rest.split_once(" substitute from "))?;
+    let name = file.rsplit(['/', '\\']).next()?;
+    Some((font, Some(name.rsplit_once('.').map_or(name, |(stem, _)| stem))))
 }
 
 /// A complaint as it may be quoted.
@@ -290,6 +354,27 @@ mod tests {
         assert!(is_better("noise", &usual) && is_better("noise", &torn) && is_better(error, &torn));
         // As versions answer that have one interpreter only.
         assert!(!is_better(error, &usual) && !is_better(&usual, &usual));
+    }
+
+    #[test]
+    fn fonts_that_were_replaced_are_named_once_and_those_of_the_standard_are_not() {
+        let said = "Page 1\nLoading font EurostileBold (or substitute) from /usr/share/gs/Font/NimbusSans-Regular\n\
+            Loading CIDFont MS-Gothic substitute from /usr/share/gs/CIDFSubst/DroidSansFallback.ttf\n\
+            Loading font ABCDEF+EurostileBold (or substitute) from /x/NimbusSans-Regular\n\
+            Loading font Helvetica-Bold (or substitute) from /x/NimbusSans-Bold\n\
+            Loading font Times (or substitute) from /x/NimbusRoman-Regular\n\
+            Loading font TimesTen (or substitute) from /x/NimbusRoman-Regular\n\
+            Loading font DejaVuSans (or substitute) from /usr/share/fonts/DejaVuSans.ttf\n\
+            Substituting font Courier for Moby.\n%%NoFont: NoSuch\n";
+        let note = replaced_fonts(said).unwrap();
+        assert!(
+            note.contains(
+                "has it: EurostileBold (drawn in NimbusSans-Regular), MS-Gothic (drawn in DroidSansFallback), TimesTen (drawn in \
+                 NimbusRoman-Regular), Moby (drawn in Courier), NoSuch; embed"
+            ),
+            "{note}"
+        );
+        assert_eq!(replaced_fonts("Page 1\nLoading font Helvetica (or substitute) from /x/NimbusSans"), None);
     }
 
     #[test]

@@ -39,6 +39,9 @@ const NO_GHOSTSCRIPT: &str = "install it (Debian, Ubuntu: apt install ghostscrip
 /// The most spot colours of a document that have plates of their own; it is ten without this, and never more.
 const SPOTS: &str = "-dMaxSpots=60";
 
+/// Always draws in bands: a transparent page that fits into memory loses its spot plates in Ghostscript 10.00.
+const BANDS: &str = "-dMaxBitmap=0";
+
 /// The plates that every page has.
 pub(super) const PROCESS: [&str; 4] = ["Cyan", "Magenta", "Yellow", "Black"];
 
@@ -185,7 +188,7 @@ fn leaves(
     };
     let to = if only.is_some() { place(1) } else { folder.path().join("draft%d.tif") };
     let options = [
-        vec!["-sCompression=lzw".into(), SPOTS.into()],
+        vec!["-sCompression=lzw".into(), SPOTS.into(), BANDS.into()],
         only.map_or_else(Vec::new, one_page),
         crop(path, part)?,
     ]
@@ -287,15 +290,22 @@ fn decoded(plate: &str) -> String {
     process::text(&bytes)
 }
 
-/// Separates a page into a TIFF for each plate beside `to`. Returns what Ghostscript says of them.
+/// Separates a page into a TIFF for each plate beside `to`. Returns what Ghostscript says of them. If `overprints`, nothing that is drawn
+/// takes ink off another plate, unless the document says so itself.
 pub(super) fn separate(
     (path, interpreter): (&Path, Interpreter),
     page: u32,
     part: Part,
     dpi: (f64, f64),
     to: &Path,
+    overprints: bool,
 ) -> Result<String, Diagnosis> {
-    let options = [one_page(page), crop(path, part)?, vec!["-dPrintSpotCMYK".into(), SPOTS.into()]].concat();
+    let mut options =
+        [one_page(page), crop(path, part)?, vec!["-dPrintSpotCMYK".into(), SPOTS.into(), BANDS.into()]]
+            .concat();
+    if overprints {
+        options.extend(["-c".into(), "true setoverprint".into()]);
+    }
     ghostscript((path, interpreter), &options, "tiffsep", dpi, to, || false)
 }
 

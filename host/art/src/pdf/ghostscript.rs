@@ -33,8 +33,21 @@ const ONE_COPY: &str = "-dNumCopies=1";
 const ALL_PLATES: &str = "-dMaxBitmap=0";
 /// Pictures are drawn pixel by pixel, whatever the document asks for: interpolated, art in one bit has tones.
 const AS_THEY_ARE: &str = "-dNOINTERPOLATE";
-const NO_COPIES: &str = "userdict begin /setpagedevice { dup /NumCopies known { dup length dict copy dup /NumCopies undef } if \
+const NO_COPIES: &str = "userdict begin \
+    /findfont { dup type /nametype eq { dup /Font resourcestatus { pop pop } { (%%NoFont: ) print dup =only (\\n) print flush } \
+    ifelse } if systemdict /findfont get exec } bind def \
+    /selectfont { 1 index type /nametype eq { exch findfont exch } if systemdict /selectfont get exec } bind def /setpagedevice { dup /NumCopies known { dup length dict copy dup /NumCopies undef } if \
     systemdict /setpagedevice get exec } bind def end";
+
+/// Whether a document is PDF.
+///
+/// # Errors
+/// Those of opening it.
+pub(super) fn is_pdf(path: &Path) -> io::Result<bool> {
+    let mut start = Vec::new();
+    File::open(path)?.take(super::HEADER as u64).read_to_end(&mut start)?;
+    Ok(super::is_pdf(&start))
+}
 
 /// Ghostscript's interpreter of PDF.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]

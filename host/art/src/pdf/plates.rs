@@ -7,18 +7,23 @@
 //! full tint. So a colour of several spots keeps each part. A name that resembles that of an ink is an error, because a
 //! slip would cost ribbon. The layers of art and the print queues use the same two functions, [`survey`] and [`separated`].
 //! If a process plate has tones, the page is drawn once more with the kind of each pixel, and what lies beside the layers is
-//! treated like any page: what drew a pixel decides how its colour is mixed. On dots of layers the process plates say what overprints.
-//! Cost: seconds a page, twice if it has tones. Limits: where a spot overprints, tints between none and full are taken as
+//! treated like any page: what drew a pixel decides how its colour is mixed. On dots of layers the process plates say what
+//! overprints. What is for a cutter is left out; marks that every plate has are printed on the plates that have more than these. Colours
+//! that are drawn over white knock it out unless the document says otherwise, which is the default of layout programs: a third run, in
+//! which all overprints, tells how many dots that are.
+//! Cost: seconds a page, twice if it has tones, once more if it has white and colours. Limits: where a spot overprints, tints between none
+//! and full are taken as
 //! proportional.
 
 use std::fmt::Display;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use protocol::ink::Kind;
+use protocol::ink::{Ink, Kind};
 use rayon::prelude::*;
 
 use super::super::artwork::Artwork;
 use super::super::coverage::{self, Coverage, Scan};
+use super::super::cut_lines;
 use super::super::error::{NamedPart, io, unknown_ink, wrong};
 use super::super::names::{self, Named};
 use super::super::options::Options;
@@ -34,32 +39,42 @@ use observe::{Diagnosis, Observer};
 /// Full ink in what Ghostscript says of a spot.
 const FULL: f64 = 32760.0;
 
-/// Whether a spot is a layer, and of which ink. One that names a process ink is printed by its process colours, like one
-/// that names no ink; of the latter there is a note, which begins with `place`.
+/// What becomes of a spot.
+enum Spot {
+    /// It is a layer of an ink.
+    Layer(Named),
+    /// It is printed by its process colours.
+    Process,
+    /// It is for a cutter and not printed.
+    Cut,
+}
+
+/// What becomes of a spot. One that names a process ink is printed by its process colours, like one that names no ink; of the latter
+/// there is a note, which begins with `place`.
 ///
 /// # Errors
 /// A name that resembles that of an ink.
-fn layer(
-    path: &Path,
-    place: &dyn Display,
-    spot: &str,
-    notes: &mut Vec<String>,
-) -> Result<Option<Named>, Diagnosis> {
+fn spot(path: &Path, place: &dyn Display, spot: &str, notes: &mut Vec<String>) -> Result<Spot, Diagnosis> {
+    if cut_lines::is_cut(spot) {
+        notes.push(cut_lines::note(place, "spot colour", spot));
+        return Ok(Spot::Cut);
+    }
     match names::ink(spot) {
-        Some(named) => Ok(Some(named).filter(|named| named.ink.kind() != Kind::Process)),
+        Some(named) if named.ink.kind() != Kind::Process => Ok(Spot::Layer(named)),
+        Some(_) => Ok(Spot::Process),
         None => match names::closest(spot) {
             suggestion @ Some(_) => Err(unknown_ink(path, NamedPart::Spot, spot, suggestion)),
             None => {
                 notes.push(format!(
                     "{place}: spot colour `{spot}` names no ink: printed by its process colours"
                 ));
-                Ok(None)
+                Ok(Spot::Process)
             }
         },
     }
 }
 
-/// Of these spots, those that are layers of ink.
+/// Of these spots, those that have plates of their own: layers of ink, and what is for a cutter.
 pub(super) fn layers(
     path: &Path,
     place: &dyn Display,
@@ -67,9 +82,9 @@ pub(super) fn layers(
     notes: &mut Vec<String>,
 ) -> Result<Vec<String>, Diagnosis> {
     let mut found = Vec::new();
-    for spot in spots {
-        if layer(path, place, spot, notes)?.is_some() {
-            found.push(spot.clone());
+    for name in spots {
+        if !matches!(spot(path, place, name, notes)?, Spot::Process) {
+            found.push(name.clone());
         }
     }
     Ok(found)
@@ -108,6 +123,10 @@ pub struct Separated {
     plates: Vec<(String, Named, Vec<u8>)>,
     /// What is printed beside the plates, with the kind of each pixel.
     rest: Option<Vec<u8>>,
+    /// The plates for a cutter.
+    cuts: Vec<Vec<u8>>,
+    /// The plate of white as it is if the colours do not knock it out, if they do.
+    knocked_out: Option<Vec<u8>>,
     notes: Vec<String>,
 }
 
@@ -133,11 +152,11 @@ pub(super) fn separated_part(
 ) -> Result<Separated, Diagnosis> {
     let folder = Scratch::new().map_err(io(path, "make a folder for its plates"))?;
     let full = folder.path().join("page.tif");
-    let said = separate((path, interpreter), page, part, dpi, &full)?;
+    let said = separate((path, interpreter), page, part, dpi, &full, false)?;
     let (width, height) =
         image::image_dimensions(&full).map_err(|_| wrong(path, format!("there is no page {page}")))?;
     let (mut plates, mut notes) = (Vec::new(), Vec::new());
-    let (mut process, mut others) = (Vec::new(), Vec::new());
+    let (mut process, mut others, mut cuts) = (Vec::new(), Vec::new(), Vec::new());
     for (plate, file) in plates_beside(&full, &folder)? {
         let scan = coverage::scan(&file, None)?;
         if (scan.width, scan.height) != (width, height) {
@@ -146,12 +165,34 @@ pub(super) fn separated_part(
         if PROCESS.contains(&plate.as_str()) {
             process.push((plate, scan.coverage));
         } else if scan.coverage.iter().any(|&c| c > 0) {
-            match layer(path, &path.display(), &plate, &mut notes)? {
-                Some(named) => plates.push((plate, named, scan.coverage)),
-                None => others.push((plate, scan.coverage)),
+            match spot(path, &path.display(), &plate, &mut notes)? {
+                Spot::Layer(named) => plates.push((plate, named, scan.coverage)),
+                Spot::Process => others.push((plate, scan.coverage)),
+                Spot::Cut => cuts.push(scan.coverage),
             }
         }
     }
+    let mut all: Vec<&mut Vec<u8>> = Vec::new();
+    all.extend(process.iter_mut().map(|(_, coverage)| coverage));
+    all.extend(plates.iter_mut().map(|(_, _, coverage)| coverage));
+    all.extend(others.iter_mut().map(|(_, coverage)| coverage));
+    all.extend(&mut cuts);
+    if unregistered(&mut all) {
+        plates.retain(|(.., coverage)| coverage.iter().any(|&c| c > 0));
+        let place = path.display();
+        notes.push(format!(
+            "{place}: marks in the registration colour are printed in the inks that the page has anyway"
+        ));
+    }
+    let knocked_out = match plates.iter().find(|(_, named, _)| named.ink == Ink::White) {
+        Some((plate, _, white)) if process.iter().any(|(_, c)| c.iter().any(|&c| c > 0)) => {
+            let again = Scratch::new().map_err(io(path, "make a folder for its plates"))?;
+            let full = again.path().join("page.tif");
+            separate((path, interpreter), page, part, dpi, &full, true)?;
+            kept(plate, white, &process, &plates_beside(&full, &again)?)?
+        }
+        _ => None,
+    };
     for (spot, coverage) in others {
         match full_tint(&said, &spot) {
             Some(tint) => add(&mut process, &coverage, tint),
@@ -168,7 +209,8 @@ pub(super) fn separated_part(
         if size != (width, height) {
             return Err(wrong(path, format!("page {page} differs in size from its plates")));
         }
-        overprint(&mut pixels, &plates, &process);
+        let own = plates.iter().map(|(.., coverage)| coverage).chain(&cuts);
+        overprint(&mut pixels, &own.collect::<Vec<_>>(), &process);
         rest = Some(pixels);
     } else {
         for (plate, coverage) in process {
@@ -177,11 +219,61 @@ pub(super) fn separated_part(
             }
         }
     }
-    Ok(Separated { size: (width as usize, height as usize), dpi: dpi.0, plates, rest, notes })
+    let size = (width as usize, height as usize);
+    Ok(Separated { size, dpi: dpi.0, plates, rest, cuts, knocked_out, notes })
+}
+
+/// Takes marks in the registration colour, which every plate has alike, off all plates that have nothing else. Whether there were any
+/// on such a plate. A page of nothing but marks keeps them.
+fn unregistered(plates: &mut [&mut Vec<u8>]) -> bool {
+    let Some(((first, others), count)) = plates.split_first().zip(plates.first().map(|plate| plate.len()))
+    else {
+        return false;
+    };
+    if others.is_empty() {
+        return false;
+    }
+    let marks: Vec<bool> = (0..count)
+        .into_par_iter()
+        .map(|at| first[at] > 0 && others.iter().all(|other| other[at] == first[at]))
+        .collect();
+    let only = |plate: &Vec<u8>| plate.par_iter().zip(&marks).all(|(&c, &mark)| c == 0 || mark);
+    let bare: Vec<bool> = plates.iter().map(|plate| only(plate)).collect();
+    if !marks.contains(&true) || bare.iter().all(|&bare| bare) {
+        return false;
+    }
+    for (plate, _) in plates.iter_mut().zip(&bare).filter(|(_, bare)| **bare) {
+        plate.fill(0);
+    }
+    bare.contains(&true)
+}
+
+/// The white that lies beneath the colours if they do not knock it out; `None` if it is the same.
+fn kept(
+    plate: &str,
+    white: &[u8],
+    process: &[(String, Vec<u8>)],
+    again: &[(String, PathBuf)],
+) -> Result<Option<Vec<u8>>, Diagnosis> {
+    let Some((_, file)) = again.iter().find(|(name, _)| name == plate) else { return Ok(None) };
+    let mut whole = coverage::scan(file, None)?.coverage;
+    if whole.len() != white.len() {
+        return Ok(None);
+    }
+    let mut knocked = false;
+    for (at, (whole, &white)) in whole.iter_mut().zip(white).enumerate() {
+        let colour = process.iter().any(|(_, coverage)| coverage[at] > 0);
+        if *whole > white && colour {
+            knocked = true;
+        } else {
+            *whole = white;
+        }
+    }
+    Ok(knocked.then_some(whole))
 }
 
 /// Replaces what was drawn on the dots of layers, where it shows the layer, with what the process plates have there.
-fn overprint(pixels: &mut [u8], layers: &[(String, Named, Vec<u8>)], process: &[(String, Vec<u8>)]) {
+fn overprint(pixels: &mut [u8], layers: &[&Vec<u8>], process: &[(String, Vec<u8>)]) {
     const ROWS: usize = 1 << 16;
     let of = |name: &str| process.iter().find(|(plate, _)| plate == name).map(|(_, coverage)| &coverage[..]);
     let inks = PROCESS.map(of);
@@ -191,7 +283,7 @@ fn overprint(pixels: &mut [u8], layers: &[(String, Named, Vec<u8>)], process: &[
     let taken = |ink: u8| taken[usize::from(ink)];
     pixels.par_chunks_mut(kinds::BYTES * ROWS).enumerate().for_each(|(block, pixels)| {
         for (at, pixel) in (block * ROWS..).zip(pixels.as_chunks_mut::<{ kinds::BYTES }>().0) {
-            if layers.iter().any(|(.., coverage)| coverage[at] > 0) {
+            if layers.iter().any(|coverage| coverage[at] > 0) {
                 let [c, m, y, k] = inks.map(|ink| ink.map_or(0, |coverage| coverage[at]));
                 let [_, rgb @ ..] = pixel;
                 *rgb = [c, m, y].map(|ink| 255 - taken(ink).saturating_add(taken(k)));
@@ -267,7 +359,15 @@ impl Separated {
         if let Some(colour) = &mut art.colour {
             colour.overprints = true;
         }
-        for (plate, named, coverage) in self.plates {
+        for (plate, named, mut coverage) in self.plates {
+            if let (Ink::White, Some(whole)) = (named.ink, &self.knocked_out) {
+                let dots = whole.iter().zip(&coverage).filter(|(whole, own)| whole > own).count() as u64;
+                if options.keep_white {
+                    coverage.clone_from(whole);
+                } else {
+                    art.knocked_out = dots;
+                }
+            }
             let scan = Scan {
                 path: name.into(),
                 width: size.0,
@@ -278,6 +378,9 @@ impl Separated {
             };
             art.add(scan, &plate, named, true, options);
         }
+        if options.cut_lines {
+            self.cuts.into_iter().for_each(|cut| art.add_cut(&window.cut(cut, self.size.0, 1)));
+        }
         art.notes.extend(self.notes);
         art
     }
@@ -286,6 +389,23 @@ impl Separated {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn marks_of_all_plates_are_taken_off_those_that_have_nothing_else() {
+        let of = |plates: [[u8; 4]; 3]| {
+            let mut plates = plates.map(Vec::from);
+            let mut all: Vec<&mut Vec<u8>> = plates.iter_mut().collect();
+            (unregistered(&mut all), plates.map(|plate| [plate[0], plate[1], plate[2], plate[3]]))
+        };
+        let black = [255, 0, 90, 0];
+        assert_eq!(of([[255, 0, 0, 0], black, [255, 0, 0, 0]]), (true, [[0; 4], black, [0; 4]]));
+        // Marks on plates that all have art, no marks, and nothing but marks.
+        for plates in
+            [[[255, 1, 0, 0], black, [255, 0, 0, 7]], [[0, 1, 0, 0], [0; 4], [0; 4]], [[255, 0, 0, 0]; 3]]
+        {
+            assert_eq!(of(plates), (false, plates));
+        }
+    }
 
     #[test]
     fn what_ghostscript_says_of_a_spot_becomes_shares() {

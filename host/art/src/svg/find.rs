@@ -1,7 +1,8 @@
 //! Which parts of a drawing are layers of ink, and what is drawn beside them.
 //!
 //! Problem: programs nest layers in groups, links, switches and drawings, name single shapes after inks, and clone layers.
-//! Method: an element is named by its label, such as that of an Inkscape layer, or else by its identifier; a clone without
+//! Method: an element is named by its label, such as that of an Inkscape layer or what Affinity and Illustrator write beside an
+//! identifier, or else by its identifier; a clone without
 //! a name of an ink by what it refers to. A group is a layer if an ink is found in its name, a single element only if the
 //! name is that of an ink and nothing else, since programs also name shapes by their colours. An ink within a layer of
 //! another ink is a layer of its own. Whatever is drawn in no layer is listed. Cost: a walk over the drawing. Limits:
@@ -10,11 +11,14 @@
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
+use protocol::ink::Ink;
 use resvg::usvg::roxmltree::{Document, NodeId};
 
+use super::super::cut_lines;
 use super::super::error::{NamedPart, unknown_ink, wrong};
 use super::super::names::{self, Named};
 use super::nodes::{self, Node};
+use super::units::AFFINITY;
 use super::write::Way;
 use observe::Diagnosis;
 
@@ -35,31 +39,40 @@ pub(super) struct Layer {
     group: bool,
     /// Whether all of it is kept from being displayed, as when an owner hides a layer.
     pub hidden: bool,
+    /// The least opacity of its elements and what is around them, if they are not opaque.
+    pub opacity: Option<f64>,
+    /// What its groups lie in.
+    beside: HashSet<NodeId>,
     /// Its elements.
     roots: HashSet<NodeId>,
     /// The elements around them.
     around: HashSet<NodeId>,
 }
 
-/// The layers of a drawing from the bottom up, and notes on what is left out.
+/// What is for a cutter and not printed.
+pub(super) type Cuts = HashSet<NodeId>;
+
+/// The layers of a drawing from the bottom up, what of it is for a cutter, and notes on what is left out.
 pub(super) fn layers(
     path: &Path,
     document: &Document<'_>,
     notes: &mut Vec<String>,
-) -> Result<Vec<Layer>, Diagnosis> {
+) -> Result<(Vec<Layer>, Cuts), Diagnosis> {
     let mut layers: Vec<Layer> = Vec::new();
-    // Of several elements with one identifier the first counts, as in the renderer.
-    let mut ids: HashMap<&str, Node> = HashMap::new();
-    for node in document.descendants() {
-        if let Some(id) = node.attribute("id") {
-            ids.entry(id).or_insert(node);
-        }
-    }
+    let mut cuts = Cuts::new();
+    let ids = nodes::by_id(document);
     let (mut slips, mut parts) = (Vec::new(), Vec::new());
     // The parser bounds the depth; a stack of its own spares this walk the recursion.
     let mut waiting: Vec<(Node, Option<usize>)> = vec![(document.root_element(), None)];
     while let Some((node, mut within)) = waiting.pop() {
         let top = node == document.root_element();
+        if !top && cut_lines::is_cut(&label(node)) {
+            if draws(node) {
+                notes.push(cut_lines::note(&path.display(), "layer", &label(node)));
+            }
+            cuts.insert(node.id());
+            continue;
+        }
         let found = if top { None } else { ink(node, within.is_some(), &ids) };
         if let Some((label, named)) = found
             && within.is_none_or(|at| layers[at].named.ink != named.ink)
@@ -72,15 +85,33 @@ pub(super) fn layers(
                 ));
             }
             let group = nodes::is_holder(node);
-            // A shape or clone joins the layer of its ink. Of two groups of one ink the owner has to say how they lie.
-            let joins = |layer: &Layer| layer.named == named && !(group && layer.group);
+            // A shape or clone joins the layer of its ink, and so does the sublayer of another object. Of two groups side by side the
+            // owner has to say how they lie.
+            let parent = node.parent().map(|parent| parent.id());
+            let joins = |layer: &Layer| {
+                layer.named == named
+                    && !(group && parent.is_some_and(|parent| layer.beside.contains(&parent)))
+            };
             let at = layers.iter().position(joins).unwrap_or_else(|| {
                 let (roots, around) = (HashSet::new(), HashSet::new());
-                layers.push(Layer { label, named, group: false, hidden: true, roots, around });
+                layers.push(Layer {
+                    label,
+                    named,
+                    group: false,
+                    hidden: true,
+                    opacity: None,
+                    beside: HashSet::new(),
+                    roots,
+                    around,
+                });
                 layers.len() - 1
             });
             layers[at].group |= group;
+            layers[at].beside.extend(parent.filter(|_| group));
             layers[at].hidden &= node.ancestors().any(nodes::is_hidden);
+            let opacity = node.ancestors().filter_map(opacity).fold(1.0, f64::min);
+            layers[at].opacity =
+                Some(opacity.min(layers[at].opacity.unwrap_or(1.0))).filter(|o| *o > 0.0 && *o < 1.0);
             layers[at].roots.insert(node.id());
             for around in node.ancestors().skip(1) {
                 // What is around this one is known then.
@@ -105,7 +136,7 @@ pub(super) fn layers(
     }
     if layers.iter().all(|layer| layer.hidden)
         && !layers.is_empty()
-        && left_out(path, document, &layers).is_some()
+        && left_out(path, document, (&layers, &cuts)).is_some()
     {
         notes.push(format!(
             "{}: printed as a picture, since all layers named after inks are hidden: {}; to print them as layers, show them in \
@@ -133,7 +164,7 @@ pub(super) fn layers(
                 return Err(unknown_ink(path, NamedPart::Layer, &name, suggestion));
             }
         }
-        if let Some(note) = left_out(path, document, &layers) {
+        if let Some(note) = left_out(path, document, (&layers, &cuts)) {
             notes.push(note);
             notes.extend(shapes_alone(path, &layers));
         }
@@ -148,12 +179,35 @@ pub(super) fn layers(
         }
     }
     notes.extend(flowed(path, document, &layers));
-    Ok(layers)
+    Ok((layers, cuts))
 }
 
-/// How to write a drawing so that only this layer is drawn.
-pub(super) fn only<'a>(layers: &'a [Layer], at: usize) -> impl FnMut(Node<'_, '_>) -> Way + 'a {
+impl Layer {
+    /// What is for a cutter, as if it were a layer.
+    pub(super) fn of_cuts(cuts: &Cuts, document: &Document<'_>) -> Layer {
+        let nodes = cuts.iter().filter_map(|id| document.get_node(*id));
+        let around = nodes.flat_map(|node| node.ancestors().skip(1)).map(|node| node.id()).collect();
+        let named = Named { place: None, ink: Ink::Black };
+        let (label, roots) = ("for a cutter".into(), cuts.clone());
+        Layer {
+            label,
+            named,
+            group: true,
+            hidden: false,
+            opacity: None,
+            beside: HashSet::new(),
+            roots,
+            around,
+        }
+    }
+}
+
+/// How to write a drawing so that only this layer is drawn. Owners let layers shine through to see what lies beneath: unless its
+/// tones are kept, a layer is opaque, whatever is drawn in it.
+pub(super) fn only<'a>(layers: &'a [Layer], at: usize, toned: bool) -> impl FnMut(Node<'_, '_>) -> Way + 'a {
     let layer = &layers[at];
+    // What comes first counts, and the renderer takes no empty part of a style.
+    let opaque = if toned { "" } else { "opacity:1!important;" };
     // Parents come first, so an element lies in the layer if its parent does.
     let mut within: HashSet<NodeId> = HashSet::new();
     move |node| {
@@ -161,13 +215,22 @@ pub(super) fn only<'a>(layers: &'a [Layer], at: usize) -> impl FnMut(Node<'_, '_
         if node.parent_element().is_none() {
             // The ground of the page is drawn in no layer.
             let own = node.attribute("style").unwrap_or_default();
-            return Way::With(vec![("style", format!("{own};background-color:none!important"))]);
+            let opaque = if opacity(node) == Some(0.0) { "" } else { opaque };
+            return Way::With(vec![("style", format!("{opaque}background-color:none!important;{own}"))]);
         }
         let inside = node.parent().is_some_and(|parent| within.contains(&parent.id()));
         let others = layers.iter().enumerate().any(|(i, other)| i != at && other.roots.contains(&id));
-        if layer.roots.contains(&id) || inside && !others {
+        let own = layer.roots.contains(&id);
+        if own || inside && !others {
             within.insert(id);
-            return Way::Keep;
+            if !own || toned {
+                return Way::Keep;
+            }
+        }
+        // What is not visible at all is hidden by its owner.
+        if (own || layer.around.contains(&id) && !toned) && opacity(node) != Some(0.0) {
+            let style = node.attribute("style").unwrap_or_default();
+            return Way::With(vec![("style", format!("{opaque}{style}"))]);
         }
         let drawn_here = node.parent().is_some_and(|parent| layer.around.contains(&parent.id())) || inside;
         if nodes::is_drawn(node) && drawn_here && !layer.around.contains(&id) {
@@ -175,6 +238,16 @@ pub(super) fn only<'a>(layers: &'a [Layer], at: usize) -> impl FnMut(Node<'_, '_
         }
         Way::Keep
     }
+}
+
+/// What an element says of its opacity, from 0 to 1.
+fn opacity(node: Node<'_, '_>) -> Option<f64> {
+    let stated = nodes::property(node, "opacity")?;
+    let share = match stated.strip_suffix('%') {
+        Some(percent) => percent.trim().parse::<f64>().ok()? / 100.0,
+        None => stated.parse().ok()?,
+    };
+    Some(share).filter(|share| (0.0..=1.0).contains(share))
 }
 
 /// Whether an element is a layer of Inkscape.
@@ -185,8 +258,9 @@ fn is_layer(node: Node<'_, '_>) -> bool {
 /// What an element is called.
 fn label(node: Node<'_, '_>) -> String {
     let own = |name: &str| node.attributes().find(|a| a.name() == name).map(|a| a.value().to_owned());
+    let affinity = || node.attribute((AFFINITY, "id")).map(str::to_owned);
     let id = || node.attribute("id").map(unescaped);
-    own("label").or_else(|| own("data-name")).or_else(id).unwrap_or_default()
+    own("label").or_else(affinity).or_else(|| own("data-name")).or_else(id).unwrap_or_default()
 }
 
 /// An identifier as it was typed: Illustrator writes `_x0020_` for a space and `_x30_` for a digit in front.
@@ -226,7 +300,7 @@ fn ink(node: Node<'_, '_>, within: bool, ids: &HashMap<&str, Node<'_, '_>>) -> O
 }
 
 /// A note on what is drawn beside the layers.
-fn left_out(path: &Path, document: &Document<'_>, layers: &[Layer]) -> Option<String> {
+fn left_out(path: &Path, document: &Document<'_>, (layers, cuts): (&[Layer], &Cuts)) -> Option<String> {
     let mut named = Vec::new();
     let mut counted: Vec<(&str, usize)> = Vec::new();
     let mut waiting = vec![document.root_element()];
@@ -235,7 +309,7 @@ fn left_out(path: &Path, document: &Document<'_>, layers: &[Layer]) -> Option<St
         if layers.iter().any(|layer| layer.roots.contains(&id)) {
             continue;
         }
-        if nodes::is_hidden(node) {
+        if nodes::is_hidden(node) || cuts.contains(&id) {
             continue;
         }
         if node == document.root_element() || layers.iter().any(|layer| layer.around.contains(&id)) {

@@ -1,5 +1,7 @@
 //! What the elements of a drawing are: their names, and which of them draw.
 
+use std::collections::HashMap;
+
 use resvg::usvg::roxmltree;
 
 pub(super) use roxmltree::Node;
@@ -44,13 +46,17 @@ pub(super) fn is_drawn(node: Node<'_, '_>) -> bool {
     is_holder(node) || is_one(node, &SHAPES) || is_flowed(node)
 }
 
+/// What an element itself says of a property, in its style or else in an attribute. Style sheets are not looked at.
+pub(super) fn property<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
+    let style = node.attribute("style").unwrap_or_default();
+    let parts = style.split(';').filter_map(|part| part.split_once(':'));
+    let own = parts.filter(|(known, _)| known.trim() == name).next_back().map(|(_, value)| value);
+    own.or_else(|| node.attribute(name)).map(|value| value.trim().trim_end_matches("!important").trim_end())
+}
+
 /// Whether an element says of itself that it is not displayed.
 pub(super) fn is_hidden(node: Node<'_, '_>) -> bool {
-    let style = node.attribute("style").unwrap_or_default();
-    let none =
-        |(name, value): (&str, &str)| name.trim() == "display" && value.trim_start().starts_with("none");
-    node.attribute("display") == Some("none")
-        || style.split(';').filter_map(|part| part.split_once(':')).any(none)
+    property(node, "display") == Some("none")
 }
 
 /// The child of a `switch` that is drawn: the first that the renderer can draw and whose conditions hold.
@@ -75,6 +81,17 @@ pub(super) fn drawn<'a, 'i>(node: Node<'a, 'i>) -> Vec<Node<'a, 'i>> {
         _ if is_holder(node) => node.children().filter(|&child| is_drawn(child)).collect(),
         _ => Vec::new(),
     }
+}
+
+/// Elements by their identifiers. Of several with one identifier the first counts, as in the renderer.
+pub(super) fn by_id<'a, 'i>(document: &'a roxmltree::Document<'i>) -> HashMap<&'a str, Node<'a, 'i>> {
+    let mut ids = HashMap::new();
+    for node in document.descendants() {
+        if let Some(id) = node.attribute("id") {
+            ids.entry(id).or_insert(node);
+        }
+    }
+    ids
 }
 
 /// What an element refers to by `#id`.

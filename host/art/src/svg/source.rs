@@ -94,6 +94,12 @@ fn lossy(bytes: &[u8]) -> String {
     encoding.decode_without_bom_handling(&bytes[mark..]).0.into_owned()
 }
 
+/// The text of these bytes if they are markup.
+pub(super) fn markup(bytes: &[u8]) -> Option<String> {
+    let start = &bytes[..bytes.len().min(1 << 12)];
+    (first_element(&lossy(start)) != First::NoMarkup).then(|| lossy(bytes))
+}
+
 /// What a text begins with.
 #[derive(PartialEq, Debug)]
 enum First {

@@ -4,8 +4,14 @@
 //! it.
 //! Method: the parsed drawing is written without prefixes, entities and foreign elements. What is not to be drawn lies in a
 //! group that is not displayed, so clones of it and definitions in it stay valid. Embedded data that cannot be decoded is
-//! written as an empty picture, because the renderer reports neither, but asks for the latter. Cost: the size of the text. Limits: style
-//! rules that ask for the parent of a hidden element (`svg > g`) do not apply to its clones.
+//! written as an empty picture, because the renderer reports neither, but asks for the latter. The standard allows no group
+//! in a clip path, and the renderer then draws nothing; Inkscape writes and shows them, so they are written as the shapes in
+//! them. Cost: the size of the text. Limits: style rules that ask for the parent of a hidden element (`svg > g`) do not apply
+//! to its clones; groups in a clip path that are clipped themselves stay groups.
+
+use std::cell::OnceCell;
+use std::collections::HashMap;
+use std::rc::Rc;
 
 use data_url::DataUrl;
 
@@ -25,16 +31,86 @@ pub(super) enum Way {
     With(Vec<(&'static str, String)>),
 }
 
+impl Way {
+    /// Both ways of writing an element; styles are joined.
+    pub fn and(self, other: Way) -> Way {
+        match (self, other) {
+            (Way::Hide, _) | (_, Way::Hide) => Way::Hide,
+            (Way::Keep, way) | (way, Way::Keep) => way,
+            (Way::With(mut all), Way::With(more)) => {
+                for (name, value) in more {
+                    match all.iter_mut().find(|(known, _)| *known == name && name == "style") {
+                        Some((_, style)) => *style = format!("{};{value}", style.trim_end_matches(';')),
+                        None => all.push((name, value)),
+                    }
+                }
+                Way::With(all)
+            }
+        }
+    }
+}
+
+/// The most elements that are written for clones of groups in clip paths: a drawing can clone clones without end.
+const MOST_CLONED: usize = 1 << 14;
+
+/// Elements by their identifiers, once they are asked for.
+type Ids<'a> = OnceCell<HashMap<&'a str, Node<'a, 'a>>>;
+
+/// What the groups around a shape in a clip path say of it.
+#[derive(Default)]
+struct Around {
+    transform: String,
+    clip_rule: Option<String>,
+}
+
+impl Around {
+    /// With what a group or a clone says.
+    fn with(&self, node: Node<'_, '_>) -> Around {
+        let moved = |name| node.attribute(name).unwrap_or("0");
+        let shift = match nodes::name(node) {
+            Some("use") => format!("translate({},{})", moved("x"), moved("y")),
+            _ => String::new(),
+        };
+        let transform = [&self.transform, node.attribute("transform").unwrap_or_default(), &shift].join(" ");
+        let own = nodes::property(node, "clip-rule").map(str::to_owned);
+        Around { transform, clip_rule: own.or_else(|| self.clip_rule.clone()) }
+    }
+
+    /// The attributes of a shape.
+    fn of(&self, shape: Node<'_, '_>) -> Vec<(&'static str, String)> {
+        let own = shape.attribute("transform").unwrap_or_default();
+        let rule = self.clip_rule.as_ref().filter(|_| nodes::property(shape, "clip-rule").is_none());
+        let transform = ("transform", format!("{} {own}", self.transform));
+        [Some(transform), rule.map(|rule| ("clip-rule", rule.clone()))].into_iter().flatten().collect()
+    }
+}
+
+/// The group that an element in a clip path is or clones.
+fn group_in_clip<'a>(node: Node<'a, 'a>, ids: &Ids<'a>) -> Option<Node<'a, 'a>> {
+    let free = |node: Node<'_, '_>| {
+        ["clip-path", "mask", "filter"].iter().all(|name| nodes::property(node, name).is_none())
+    };
+    let target = match nodes::name(node)? {
+        "use" => *ids.get_or_init(|| nodes::by_id(node.document())).get(nodes::reference(node)?)?,
+        _ => node,
+    };
+    (matches!(nodes::name(target), Some("g" | "symbol" | "a" | "svg")) && free(node) && free(target))
+        .then_some(target)
+}
+
 /// Writes a drawing; `way` is asked for each element, parents first.
 pub(super) fn written<'a>(root: Node<'a, 'a>, mut way: impl FnMut(Node<'a, 'a>) -> Way) -> String {
     enum Step<'a> {
         Open(Node<'a, 'a>),
+        /// A part of a clip path, and what is around it there.
+        Clip(Node<'a, 'a>, Rc<Around>),
         Close(&'a str),
     }
     let mut out = String::new();
     let mut steps = vec![Step::Open(root)];
+    let (mut cloned, ids) = (0, Ids::default());
     while let Some(step) = steps.pop() {
-        let node = match step {
+        let (node, around) = match step {
             Step::Close(name) => {
                 out.extend(["</", name, ">"]);
                 continue;
@@ -43,7 +119,23 @@ pub(super) fn written<'a>(root: Node<'a, 'a>, mut way: impl FnMut(Node<'a, 'a>) 
                 escape(&mut out, node.text().unwrap_or_default(), false);
                 continue;
             }
-            Step::Open(node) => node,
+            Step::Open(node) => (node, None),
+            Step::Clip(node, around) => match group_in_clip(node, &ids).filter(|_| cloned < MOST_CLONED) {
+                Some(_) if nodes::is_hidden(node) => continue,
+                Some(group) => {
+                    let mut around = around.with(node);
+                    if group != node {
+                        around = around.with(group);
+                    }
+                    let (around, first) = (Rc::new(around), steps.len());
+                    let shapes = group.children().filter(|child| nodes::is_drawn(*child));
+                    steps.extend(shapes.map(|child| Step::Clip(child, around.clone())));
+                    cloned += steps.len() - first + 1;
+                    steps[first..].reverse();
+                    continue;
+                }
+                None => (node, Some(around)),
+            },
         };
         let Some(name) = nodes::name(node) else { continue };
         // The renderer takes the first child whose conditions hold; only that child is kept, see below.
@@ -53,7 +145,10 @@ pub(super) fn written<'a>(root: Node<'a, 'a>, mut way: impl FnMut(Node<'a, 'a>) 
                 && nodes::is_drawn(node)
                 && nodes::chosen(parent) != Some(node)
         });
-        let way = way(node);
+        let way = match (way(node), around) {
+            (Way::Keep, Some(around)) if !around.transform.is_empty() => Way::With(around.of(node)),
+            (way, _) => way,
+        };
         if unchosen || matches!(way, Way::Hide) {
             out.push_str("<g display=\"none\">");
             steps.push(Step::Close("g"));
@@ -81,7 +176,12 @@ pub(super) fn written<'a>(root: Node<'a, 'a>, mut way: impl FnMut(Node<'a, 'a>) 
         out.push('>');
         steps.push(Step::Close(name));
         let first = steps.len();
-        steps.extend(node.children().map(Step::Open));
+        if name == "clipPath" {
+            let around = Rc::new(Around::default());
+            steps.extend(node.children().map(|child| Step::Clip(child, around.clone())));
+        } else {
+            steps.extend(node.children().map(Step::Open));
+        }
         steps[first..].reverse();
     }
     out

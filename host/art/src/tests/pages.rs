@@ -147,9 +147,9 @@ fn a_page_for_each_ink_is_a_layer_for_each() {
 /// A white plate, a spot that names no ink, and a colour made of both.
 const MIXED: &str = "%!PS-Adobe-3.0
 <</PageSize [144 72]>> setpagedevice
-[/Separation (Dieline) /DeviceCMYK {0 exch dup 0.5 mul 0}] setcolorspace 1 setcolor 12 12 96 6 rectfill
+[/Separation (Violet) /DeviceCMYK {0 exch dup 0.5 mul 0}] setcolorspace 1 setcolor 12 12 96 6 rectfill
 [/Separation (White) /DeviceCMYK {pop 0 0 0 0}] setcolorspace 1 setcolor 12 30 96 30 rectfill
-[/DeviceN [/White /Dieline] /DeviceCMYK {exch pop 0 exch dup 0.5 mul 0}] setcolorspace
+[/DeviceN [/White /Violet] /DeviceCMYK {exch pop 0 exch dup 0.5 mul 0}] setcolorspace
 1 0.5 setcolor 24 36 36 12 rectfill
 showpage
 ";
@@ -184,7 +184,7 @@ fn spots_without_an_ink_print_by_their_process_colours_in_layers_and_queue_alike
         let found = key::colour(keys[y * art.width + x]);
         assert!(found.iter().zip(wanted).all(|(v, w)| v.abs_diff(w) <= 3), "at {x}, {y}: {found:?}");
     }
-    let note = "spot colour `Dieline` names no ink: printed by its process colours";
+    let note = "spot colour `Violet` names no ink: printed by its process colours";
     assert!(art.notes.iter().any(|said| said.contains(note)), "{:?}", art.notes);
     // The queue's way.
     assert_eq!(pdf::survey(&file, &Silent).unwrap().spots, [["White"]]);
@@ -194,7 +194,7 @@ fn spots_without_an_ink_print_by_their_process_colours_in_layers_and_queue_alike
     let keys = |art: &Artwork| art.colour.as_ref().map(|colour| colour.keys((art.width, art.length)));
     assert_eq!((amounts(&queued), keys(&queued)), (amounts(&art), keys(&art)));
     // A slip is an error in both.
-    let slip = bench.write("slip.ps", MIXED.replace("Dieline", "Golld"));
+    let slip = bench.write("slip.ps", MIXED.replace("Violet", "Golld"));
     for error in [
         pdf::survey(&slip, &Silent).map(|found| found.spots).unwrap_err(),
         open(&[slip], &Options::default(), &Silent).unwrap_err(),

@@ -346,7 +346,7 @@ impl<'a> Delivery<'a> {
         if let Some(note) = printers.note() {
             caller.tell(&News::Note(&note));
         }
-        Delivery { printers, ledger: Ledger::in_folder(printers.folder()), caller }
+        Delivery { printers, ledger: Ledger::of(printers), caller }
     }
 
     /// Queues a job for the bridge at `to` under a new number. When this returns it is on disk, and nothing of it is printed.

@@ -250,3 +250,55 @@ fn the_halftones_have_the_same_tones() {
     }
     assert_eq!(print("SF", "MS").width(), 3 * column - 47);
 }
+
+#[test]
+fn the_first_sheet_has_four_bars_where_a_ruler_looks_for_them_in_a_job_of_less_than_two_kilobytes() {
+    use super::first::{APART, BARS, PLACE, WIDE};
+    let dots = |mm: f64| (mm * 600.0 / 25.4).round() as usize;
+    for paper in [Paper::A4, Paper::Postcard] {
+        let chart = first(Ink::Black, paper).unwrap();
+        let (x, top) = (dots(PLACE.0) - 80, usize::from(paper.top()));
+        for bar in 0..BARS {
+            let y = dots(PLACE.1 + APART * bar as f64) - top;
+            let place = (x - 20, y - 20, dots(WIDE) + 40, dots(1.0) + 40);
+            assert!(count(&chart, place, "K").abs_diff(dots(1.0) * dots(WIDE)) < 150, "{paper:?} {bar}");
+        }
+        let all = count(&chart, (0, 0, chart.width(), chart.length()), "K");
+        assert!(all.abs_diff(BARS * dots(1.0) * dots(WIDE)) < 500);
+        let library = Library::builtin();
+        let layout = Layout::centred(paper);
+        let allowed = inks::InkSet::of([Ink::Black]);
+        let request = crate::pipeline::Request {
+            name: "first",
+            dots: &chart,
+            layout: &layout,
+            handling: Default::default(),
+            allowed,
+            library: &library,
+        };
+        assert!(crate::pipeline::job(&request, &Silent).unwrap().bytes.len() < 2000);
+    }
+    let small = Paper::Custom { width: 900, length: 4000 };
+    assert!(matches!(first(Ink::Black, small), Err(ChartError::Paper { chart: "first", .. })));
+}
+
+#[test]
+fn a_strip_for_each_ink_has_every_row_of_the_head_by_itself() {
+    let inks = [Ink::Black, Ink::White, Ink::MetallicGold];
+    let chart = heads(&inks, Paper::A4).unwrap();
+    for ink in inks {
+        let number = chart.stacks().iter().position(|s| *s == Stack::new([ink])).unwrap();
+        let has = |x: usize, y: usize| usize::from(chart.index()[y * chart.width() + x]) == number;
+        let within = |y: &usize| (0..chart.width()).any(|x| has(x, *y));
+        let rows: Vec<usize> = (0..chart.length()).filter(within).collect();
+        // More than the band of 10 mm that the head prints at once.
+        assert!(rows.len() as f64 * 25.4 / 600.0 > 11.0, "{ink:?}: {} rows", rows.len());
+        for &y in &rows {
+            let alone = (0..chart.width()).any(|x| has(x, y) && !has(x, y - 1) && !has(x, y + 1));
+            assert!(alone, "{ink:?}, row {y}");
+        }
+        let columns: Vec<usize> = (0..chart.width()).filter(|&x| rows.iter().any(|&y| has(x, y))).collect();
+        let wide = (columns[columns.len() - 1] - columns[0]) as f64 * 25.4 / 600.0;
+        assert!(wide < 17.0, "{ink:?} takes {wide} mm of ribbon for each band");
+    }
+}

@@ -121,7 +121,7 @@ pub struct Bounds {
 
 /// The first fault of a stream.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, thiserror::Error)]
-#[error("byte {offset}: {words} (fault {fault})")]
+#[error("byte {offset}: {words}")]
 pub struct StreamError {
     /// Offset of the byte.
     pub offset: u64,

@@ -8,7 +8,7 @@ use inks::{Certainty, Library, Severity};
 use observe::visible_line;
 use protocol::ink::{Ink, Kind};
 use protocol::paper::{LEFT, Paper};
-use protocol::rgl::Page;
+use protocol::rgl::{Media, Page};
 use serde::Serialize;
 
 use super::cost::{self, Cost, Price};
@@ -18,7 +18,7 @@ use super::thin::thin;
 use crate::layout::{Cut, Laid, Mm, paper};
 use crate::separate::{Check, MOST_CARTRIDGES, Pass as Dots, Planned, Separation};
 use sheet::colours::colours;
-use sheet::{Area, Sheet};
+use sheet::{Area, Plane, Sheet};
 
 /// Lines of foil thinner than this many dots (0.17 mm) may not stick: foil fails on screens finer than about 100 an inch,
 /// whose smaller dots are of this size.
@@ -341,6 +341,20 @@ fn shares(sheet: &Sheet, laid: &Laid, library: &Library) -> Vec<Share> {
     stacks
 }
 
+/// What of a plane lies within these areas.
+fn copies(plane: &Plane, areas: &[Area]) -> Plane {
+    let mut copies = Plane { bits: vec![0; plane.bits.len()], ..plane.clone() };
+    for area in areas {
+        for row in area.top..(area.top + area.length).min(plane.length) {
+            let own = row * plane.stride;
+            for x in area.left..(area.left + area.width).min(plane.width) {
+                copies.bits[own + x / 8] |= plane.bits[own + x / 8] & (0x80 >> (x % 8));
+            }
+        }
+    }
+    copies
+}
+
 /// The rules' checks and those that only the layout and the planes show, most severe first.
 fn checks(subject: &Subject<'_>) -> Vec<Check> {
     let mut checks = subject.checks.to_vec();
@@ -358,8 +372,18 @@ fn checks(subject: &Subject<'_>) -> Vec<Check> {
         );
         add("marks", Severity::Note, Certainty::Measured, text);
     }
+    if subject.page.paper == Paper::Postcard {
+        let text = "set the feed lever to M: postcards are fed by hand; moving the lever while a sheet is in the printer ejects it";
+        add("lever", Severity::Note, Certainty::Vendor, text.into());
+    }
+    if subject.page.media == Media::GlossyLabel {
+        let text = "use only labels that are sold for thermal transfer";
+        add("labels", Severity::Note, Certainty::Vendor, text.into());
+    }
     let foils = subject.passes.iter().filter(|pass| pass.ink.kind() == Kind::Foil);
-    for (pass, (few, all)) in foils.map(|pass| (pass, thin(&pass.plane, FOIL_LINE))) {
+    // What marks have of a foil is no art.
+    let art = |pass: &Dots| thin(&copies(&pass.plane, &subject.laid.copies), FOIL_LINE);
+    for (pass, (few, all)) in foils.map(|pass| (pass, art(pass))) {
         let share = few as f64 / all.max(1) as f64;
         if share > FOIL_SHARE {
             let text = format!(

@@ -71,10 +71,7 @@ fn grid(layout: &Layout, size: (i64, i64), gap: (i64, i64), room: Rect) -> Resul
             Ok((columns, rows))
         }
         Repeat::Fill => {
-            let start = match layout.position {
-                Position::Centred => (room.left, room.top),
-                _ => corner(layout, (0, 0), room),
-            };
+            let start = start(layout, room);
             let count = |room: i64, side: i64, gap: i64| {
                 ((room + gap) / (side + gap)).clamp(0, i64::from(MOST_REPEATS)) as u16
             };
@@ -91,6 +88,14 @@ fn grid(layout: &Layout, size: (i64, i64), gap: (i64, i64), room: Rect) -> Resul
             }
             Ok((columns, rows))
         }
+    }
+}
+
+/// The top left corner of a block that is as large as its room.
+pub(super) fn start(layout: &Layout, room: Rect) -> (i64, i64) {
+    match layout.position {
+        Position::Centred => (room.left, room.top),
+        _ => corner(layout, (0, 0), room),
     }
 }
 

@@ -18,7 +18,7 @@ mod settings;
 pub mod size;
 
 use inks::Stack;
-use protocol::paper::Paper;
+use protocol::paper::{LEFT, Paper};
 use protocol::rgl::Resolution;
 use protocol::walk::{EDGE, Frame};
 
@@ -83,6 +83,37 @@ impl Laid {
 /// Those of [`arrange`] that follow from sizes.
 pub fn check(width: usize, length: usize, layout: &Layout) -> Result<(), LayoutError> {
     Block::of((width, length), layout).map(|_| ())
+}
+
+/// Where copies and their registration marks lie on the sheet of paper.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Places {
+    /// The top left corner of each copy, row by row, in millimetres from that of the sheet.
+    pub copies: Vec<(f64, f64)>,
+    /// The middles of the registration marks.
+    pub marks: Vec<(f64, f64)>,
+}
+
+/// Where a dot map of this size will be on the sheet, before it is made.
+///
+/// # Errors
+/// Those of [`check`].
+pub fn places(width: usize, length: usize, layout: &Layout) -> Result<Places, LayoutError> {
+    let block = Block::of((width / layout.across().max(1), length), layout)?;
+    let (left, top) = (i64::from(LEFT), i64::from(layout.paper.top()));
+    let mm = |dots: f64| dots * 25.4 / 600.0;
+    let place = |x: f64, y: f64| (mm(x + left as f64), mm(y + top as f64));
+    let corner = |row: i64| block.columns.iter().map(move |&(x, _)| place(x as f64, row as f64));
+    let copies = block.rows.iter().flat_map(|&(row, _)| corner(row)).collect();
+    let marks = match layout.registration_marks {
+        true => marks::registration(block.place, block.room, layout.crop_marks).0,
+        false => Vec::new(),
+    };
+    let middle = |mark: &marks::Mark| {
+        let Rect { left, top, right, bottom } = mark.place;
+        place((left + right) as f64 / 2.0, (top + bottom) as f64 / 2.0)
+    };
+    Ok(Places { copies, marks: marks.iter().map(middle).collect() })
 }
 
 /// Where the walk along which a dot map of this size was halftoned begins on the page, and how far it reaches: the first copy.

@@ -95,9 +95,14 @@ impl Layout {
         reach.meet(Rect { left: 0, right: width, top: 0, bottom: length })
     }
 
-    /// Width and length in dots of the largest copy that can be printed as often as the grid says, marks not counted.
+    /// Width and length in dots of the largest copy that can be printed where the position says and as often as the grid says,
+    /// marks not counted.
     pub fn largest(&self) -> (usize, usize) {
-        let room = self.room();
+        let whole = self.room();
+        let (left, top) = super::block::start(self, whole);
+        // From a corner beyond the room nothing can be printed, which the layout itself refuses.
+        let rest = whole.meet(Rect { left, top, ..whole });
+        let room = if rest.width() > 0 && rest.length() > 0 { rest } else { whole };
         let (columns, rows) = match self.repeat {
             Repeat::Grid(columns, rows) => (columns.max(1), rows.max(1)),
             Repeat::Fill => (1, 1),

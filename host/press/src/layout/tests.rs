@@ -219,6 +219,11 @@ fn without_anything_asked_the_page_is_the_artwork_in_its_middle() {
     assert!(arrange(&solid(2350, 2076, "K"), &grid, &Silent).is_ok());
     assert!(arrange(&solid(2351, 2076, "K"), &grid, &Silent).is_err());
     assert!(arrange(&solid(2350, 2077, "K"), &grid, &Silent).is_err());
+    // From a corner there is room as far as the other edges; from beyond the page the layout is refused.
+    for (x, y, largest) in [(40, 72, (4760, 6300)), (-40, 0, (4800, 6372)), (4800, 0, (4800, 6372))] {
+        let position = Position::FromPrintable(dots(x, y));
+        assert_eq!(Layout { position, ..Layout::centred(Paper::A4) }.largest(), largest, "{x}, {y}");
+    }
     let whole = solid(4740, 100, "K");
     assert_eq!(arrange(&whole, &layout, &Silent).unwrap().laid.area.left, 0);
 }

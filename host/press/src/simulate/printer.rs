@@ -23,7 +23,7 @@ pub(super) fn from_dots(dots: u16, dpi: u16) -> u16 {
 
 /// The first byte that is not part of a legal job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("byte {offset}: {} (fault {})", words(*fault), fault.number())]
+#[error("byte {offset}: {}", words(*fault))]
 pub struct Refused {
     /// Its offset from the first byte since the printer was switched on.
     pub offset: u64,

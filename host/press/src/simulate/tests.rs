@@ -340,7 +340,7 @@ fn messages_say_which_byte_which_ink_and_what_to_do() {
     let mut bad = job(SMALL, &three());
     bad[3] = 0;
     let text = print(&bad, &Setup::default(), &Silent).unwrap_err().to_string();
-    assert_eq!(text, "byte 0: no command of the printer's language begins with these bytes (fault 1)");
+    assert_eq!(text, "byte 0: no command of the printer's language begins with these bytes");
     let setup = Setup { cartridges: Some(vec![]), ..Setup::default() };
     let text = print(&job(SMALL, &three()), &setup, &Silent).unwrap_err().to_string();
     assert!(text.ends_with("ribbon mismatch: insert the white cartridge (barcode 16)"), "{text}");

@@ -199,5 +199,7 @@ impl Choice for Accept {
         (Accept::FoilUndercoat, "foil-undercoat", "Solid cyan, magenta, yellow and black beneath every foil"),
         (Accept::EvenWhite, "even-white", "Primer, finish and primer between black and the white above it"),
         (Accept::WhiteThrice, "white-thrice", "Three layers of white instead of one"),
+        (Accept::SilverUnderWhite, "silver-under-white", "Metallic silver beneath white, for dark grounds"),
+        (Accept::WhiteKept, "white-kept", "White beneath the colours of a page that knock it out"),
     ];
 }

@@ -20,6 +20,8 @@ use sheet::DotMap;
 /// Arguments of `chart`.
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  \
+    foilpress chart first --to serial:/dev/ttyACM0       (a printer's first sheet: 5 mm of black)\n  \
+    foilpress chart heads --inks black,white             (a narrow strip for each cartridge)\n  \
     foilpress chart ramp silver-foil metallic-silver     (figure 2 of the paper)\n  \
     foilpress chart ladder                               (figure 5: four levels of gloss, MS+F to MS)\n  \
     foilpress chart ladder C+M+Y+F C+M+Y\n  \
@@ -35,6 +37,10 @@ pub struct Args {
 
 #[derive(Subcommand, Debug)]
 enum Chart {
+    /// Print four bars with 5 mm of one cartridge on plain paper, and say what a ruler must find: the first sheet of a printer
+    First(First),
+    /// Print a narrow strip for each ink, and say what to look for: the state of the head and of each cartridge
+    Heads(Heads),
     /// Print a halftoned ramp from one stack to another, clusters of 1 to 24 dots of both for `measure ramp`, and a checkerboard
     /// to hold so that the ramp reflects it
     Ramp(Ramp),
@@ -50,6 +56,24 @@ enum Chart {
     /// Print two crosses to measure with a ruler, for `foilpress profile set`: where this printer prints and how far it
     /// feeds
     Calibration(Calibration),
+}
+
+#[derive(ClapArgs, Debug)]
+struct First {
+    /// Ink to print with
+    #[arg(long, default_value = "black", value_parser = typed)]
+    ink: Ink,
+    #[command(flatten)]
+    whole: WholePage,
+}
+
+#[derive(ClapArgs, Debug)]
+struct Heads {
+    /// Inks of the loaded cartridges, separated by commas
+    #[arg(long, value_name = "INKS", value_delimiter = ',', default_value = "black,cyan,magenta,yellow", value_parser = typed)]
+    inks: Vec<Ink>,
+    #[command(flatten)]
+    whole: WholePage,
 }
 
 #[derive(ClapArgs, Debug)]
@@ -183,20 +207,49 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
             print(&artwork, &layout, &stacks.job, observer)
         }
         Chart::Registration(registration) => {
-            let inks = &registration.inks;
-            if let Some(twice) = inks.iter().enumerate().find(|(i, ink)| inks[..*i].contains(ink)) {
-                bail!("--inks: {} is given twice", twice.1.name());
-            }
+            let inks = once_each(&registration.inks)?;
             let dots = chart::registration(inks, registration.whole.paper)?;
-            registration.whole.print("registration", &dots, inks, true, observer)
+            registration.whole.print("registration", &dots, (inks, ""), true, observer)
         }
         Chart::Calibration(calibration) => {
             let ink = calibration.ink;
             let dots = chart::calibration(ink, calibration.whole.paper, &NEXT)?;
-            calibration.whole.print("calibration", &dots, &[ink], false, observer)
+            calibration.whole.print("calibration", &dots, (&[ink], ""), false, observer)
+        }
+        Chart::First(First { ink, whole }) => {
+            let dots = chart::first(*ink, whole.paper)?;
+            whole.print("first", &dots, (&[*ink], &on_first()), false, observer)
+        }
+        Chart::Heads(Heads { inks, whole }) => {
+            let dots = chart::heads(once_each(inks)?, whole.paper)?;
+            whole.print("heads", &dots, (inks, ON_HEADS), false, observer)
         }
     }
 }
+
+/// Inks none of which is given twice.
+fn once_each(inks: &[Ink]) -> Result<&[Ink]> {
+    match inks.iter().enumerate().find(|(i, ink)| inks[..*i].contains(ink)) {
+        Some((_, twice)) => bail!("--inks: {} is given twice", twice.name()),
+        None => Ok(inks),
+    }
+}
+
+/// What a ruler must find on the first sheet.
+fn on_first() -> String {
+    use chart::first::{APART, BARS, PLACE, WIDE};
+    format!(
+        "\nA ruler must find: {BARS} bars, {WIDE:.1} mm wide, {APART:.1} mm from bar to bar; the first {:.1} mm from the left edge of the \
+         sheet and {:.1} mm from the top edge.\nUp to 2 mm beside is how printers differ: `foilpress chart calibration` measures it. After a \
+         long rest the first sheets are faint.\n",
+        PLACE.0, PLACE.1
+    )
+}
+
+/// What to look for on the strips.
+const ON_HEADS: &str = "\nLook for: an area without streaks across the sheet (a streak in every ink is the head, in one ink its ribbon); steps of \
+    lines without a gap (a line that is missing in every ink is a dead place of the head); a chequer that is even (grey or torn: a \
+    ribbon that does not run, or paper that is too rough).\n";
 
 /// What to do with what was measured on the calibration chart, printed on it.
 const NEXT: [&str; 2] = ["3. foilpress profile set default --cross X,Ymm \\", "       --distance Dmm"];
@@ -248,12 +301,13 @@ impl WholePage {
         &self,
         name: &str,
         dots: &DotMap,
-        inks: &[Ink],
+        (inks, advice): (&[Ink], &str),
         camera_marks: bool,
         observer: &dyn Observer,
     ) -> Result<()> {
         let library = Library::builtin();
-        let artwork = artwork(name, dots, InkSet::of(inks.iter().copied()), &library);
+        let allowed = InkSet::of(inks.iter().copied());
+        let artwork = Artwork { advice: advice.into(), ..artwork(name, dots, allowed, &library) };
         let layout = Layout { camera_marks, ..Layout::centred(self.paper) };
         artwork.print(&layout, &self.media, &self.result, &self.deliver, observer)
     }

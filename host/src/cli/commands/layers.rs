@@ -15,6 +15,8 @@ use crate::cli::arguments::layout::{LayoutArgs, MediaArgs};
 use crate::cli::commands::preset::PresetArg;
 use crate::cli::console::advice;
 use crate::cli::console::usage;
+use crate::cli::output::{Staged, write};
+use crate::cli::printing::cut_lines;
 use crate::cli::printing::deliver::DeliverArgs;
 use crate::cli::printing::plan_output::PlanOutputArgs;
 use crate::cli::printing::{Artwork, ResultArgs};
@@ -31,7 +33,7 @@ use sheet::Size;
 #[derive(ClapArgs, Debug)]
 pub struct LayersArgs {
     /// Artwork: pictures named after their inks (white.png, 02-gold.png), a folder of them, a TIFF with named spot
-    /// channels, an SVG with named layers, a PDF or PostScript file, or one picture
+    /// channels, an SVG or OpenRaster file with named layers, a PDF or PostScript file, or one picture
     #[arg(value_name = "ART", required = true)]
     pub art: Vec<PathBuf>,
     /// Print the vendor's reserved colours in their inks: white 230,230,230, gold 225,160,0, silver 189,193,197,
@@ -42,7 +44,8 @@ pub struct LayersArgs {
     /// for metals]
     #[arg(long, value_name = "STEPS", requires = "reserved", value_parser = whole(0..=60u8))]
     pub tolerance: Option<u8>,
-    /// Resolution of the pictures in pixels per inch, if a file states none or a wrong one
+    /// Resolution of the pictures in pixels per inch, if a file states none or a wrong one; of a drawing that states no size on
+    /// paper, its units per inch
     #[arg(long, value_name = "DPI", value_parser = dpi)]
     pub dpi: Option<f64>,
     /// Page of a PDF, PostScript or TIFF file [default: the only page with art; several are an error]
@@ -199,6 +202,8 @@ impl LayersArgs {
             across: layout.resolution.across(1).into(),
             tones: self.tones.as_deref().map_or(Ok(InkSet::EMPTY), |text| set("--tones", text))?,
             inks: self.inks()?,
+            cut_lines: false,
+            keep_white: self.accept.contains(&Accept::WhiteKept),
             room: Room { width, length, cut: layout.cut },
         })
     }
@@ -278,6 +283,12 @@ pub struct Work {
     /// Along the sheet it is always 600 dpi. The printer prints every other ink wrong at 1200 dpi, so such a job is refused.
     #[arg(long, value_name = "DPI", default_value = "600", value_parser = resolution)]
     resolution: Resolution,
+    /// Write the lines for a cutter, with the registration marks, to this SVG in millimetres of the sheet
+    ///
+    /// They are what the art has in a spot colour or layer named CutContour, KissCut, ThruCut, PerfCut, Crease, Dieline and the like.
+    /// Never printed, with this option or without.
+    #[arg(long, value_name = "FILE.svg")]
+    cut_lines: Option<PathBuf>,
     #[command(flatten)]
     layout: LayoutArgs,
     #[command(flatten)]
@@ -337,11 +348,16 @@ impl Work {
     ) -> Result<T> {
         let library = self.layers.library()?;
         let layout = Layout { resolution: self.resolution, ..self.layout.layout(observer)? };
-        let options = self.layers.options(self.size, &layout)?;
+        let lines = self.cut_lines.as_deref().map(Staged::file).transpose()?;
+        let options = art::Options { cut_lines: lines.is_some(), ..self.layers.options(self.size, &layout)? };
         let settings = self.layers.settings()?;
         let art = art::open(&self.layers.art, &options, observer)?;
         // Before the long work.
         layout::check(art.width / usize::from(self.resolution.across(1)), art.length, &layout)?;
+        let lines = match (lines, &self.cut_lines) {
+            (Some(staged), Some(to)) => Some((staged, cut_lines::drawing(&art, &layout, to)?)),
+            _ => None,
+        };
         let mut composed = art::compose(&art, &settings, &library, observer)?;
         for note in self.layers.idle(&art, &options, &settings, &composed) {
             observer.note(&note);
@@ -357,7 +373,12 @@ impl Work {
             report: json!({ "art": { "composed": composed.report } }),
             advice: words(&composed),
         };
-        then(&artwork, &layout)
+        let done = then(&artwork, &layout)?;
+        if let Some((staged, drawing)) = lines {
+            write(staged.path(), drawing.as_bytes())?;
+            staged.commit()?;
+        }
+        Ok(done)
     }
 }
 

@@ -82,7 +82,7 @@ fn ribbon_length(text: &str) -> Result<f64, String> {
 
 /// The prices in the ledger; none if it cannot be read, for a plan does not depend on them.
 pub fn prices() -> Vec<Price> {
-    let read = || anyhow::Ok(Ledger::in_folder(Printers::of_system()?.folder()).lines()?.0);
+    let read = || anyhow::Ok(Ledger::of(&Printers::of_system()?).lines()?.0);
     // Jobs that never ended count by what their journals know only where ribbon is reported.
     read().map_or_else(|_| Vec::new(), |lines| ledger::prices(&lines, |_| None))
 }
@@ -90,7 +90,7 @@ pub fn prices() -> Vec<Price> {
 /// Runs `ledger`.
 pub fn run(args: &Args) -> Result<()> {
     let journal = Journal::of_user()?;
-    let ledger = Ledger::in_folder(Printers::of_system()?.folder());
+    let ledger = Ledger::of(&Printers::of_system()?);
     if let Some(Command::New { ink }) = &args.command {
         ledger.append(Event::New { ink: ink.name().into() })?;
         return show(&format!("{}: a new cartridge, counted from now on\n", ink.name()));

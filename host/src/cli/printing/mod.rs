@@ -2,6 +2,7 @@
 //!
 //! What everything that is printed has in common, whatever made the dots.
 
+pub mod cut_lines;
 pub mod deliver;
 pub mod plan_output;
 

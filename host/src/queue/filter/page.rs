@@ -26,6 +26,8 @@ pub(super) struct Press<'a> {
     pub jobs: usize,
     /// Pages on which something is white.
     pub white: usize,
+    /// The first page on which everything lies on the margins, and how far.
+    pub in_margins: Option<(usize, Cut)>,
 }
 
 impl Press<'_> {
@@ -90,7 +92,7 @@ impl Press<'_> {
     /// What of a page is printed, and where. `drawn` is the window around everything on it, none if it is blank. Notes why
     /// nothing is printed.
     pub(super) fn view(
-        &self,
+        &mut self,
         number: usize,
         paper: Paper,
         (size, dpi): ((usize, usize), u16),
@@ -103,13 +105,17 @@ impl Press<'_> {
         };
         // A page is turned about its middle, not what is drawn on it.
         let whole = mirrored || self.choices.finish == art::Finish::All;
-        let view = View::of(self.choices.place, paper, (size, dpi), drawn, whole);
-        if view.is_none() {
-            self.observer.note(&format!(
-                "everything on page {number} lies on the margins, where the printer cannot print; the page is skipped"
-            ));
+        match View::of(self.choices.place, paper, (size, dpi), drawn, whole) {
+            Ok(view) => Some(view),
+            Err(beyond) => {
+                self.observer.note(&format!(
+                    "everything on page {number} lies on the margins, where the printer cannot print ({beyond}); the page is \
+                     skipped"
+                ));
+                self.in_margins.get_or_insert((number, beyond));
+                None
+            }
         }
-        view
     }
 
     /// The job of a page's art. `mirrored` turns it left to right.
@@ -201,13 +207,16 @@ pub(super) struct View {
 
 impl View {
     /// `whole` asks for all that can be printed, also where nothing is drawn.
+    ///
+    /// # Errors
+    /// How far everything lies beyond what can be printed.
     fn of(
         place: Place,
         paper: Paper,
         (size, dpi): ((usize, usize), u16),
         drawn: Window,
         whole: bool,
-    ) -> Option<View> {
+    ) -> Result<View, Cut> {
         let pixels = |dots: u16| usize::from(dots) * usize::from(dpi) / 600;
         let (across, down) = (pixels(paper.width()), pixels(paper.length()));
         let position = match place {
@@ -224,11 +233,11 @@ impl View {
                     bottom: mm((drawn.top + drawn.height).saturating_sub(top + height)),
                 };
                 let room = Window { left, top, width, height };
-                let seen = drawn.meet(&room)?;
+                let Some(seen) = drawn.meet(&room) else { return Err(beyond) };
                 // What is bare costs as much time as what is drawn.
                 let window = if whole { room } else { seen };
                 let dots = |pixels: usize| Mm::of_dots((pixels * 600 / usize::from(dpi)) as i64);
-                return Some(View {
+                return Ok(View {
                     window,
                     position: Position::FromPrintable(Point(
                         dots(window.left - left),
@@ -248,6 +257,6 @@ impl View {
             bottom: over(drawn.height, window.height),
             ..Cut::default()
         };
-        Some(View { window, position, beyond: (beyond != Cut::default()).then_some(beyond) })
+        Ok(View { window, position, beyond: (beyond != Cut::default()).then_some(beyond) })
     }
 }

@@ -1,0 +1,163 @@
+//! The pictures of a drawing: embedded, or linked beside it.
+//!
+//! Problem: the renderer leaves out a picture that it cannot load, and says so nowhere. A link may lead to a device, a pipe,
+//! or any file of the computer; what is linked or embedded may expand to any size.
+//! Method: links are followed as in other documents: to an ordinary file in the folder of the drawing or below. Each picture
+//! is decoded here first. A drawing within the drawing meets the same bounds as the drawing itself. The first picture that
+//! cannot be drawn is remembered with the reason. Cost: each picture is decoded once more. Limits: 256 MB of file, 2^26
+//! pixels; drawings within a drawing may hold pictures, but not link them, as SVG demands.
+
+use std::borrow::Cow;
+use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use image::{ImageError, ImageFormat};
+use percent_encoding::percent_decode_str;
+use pictures::{Bounds, Opened};
+use resvg::usvg::{ImageHrefResolver, ImageKind};
+
+use super::super::decode::whole_jpeg;
+use super::render::Without;
+use super::{MOST_BYTES, bounds, source};
+
+/// The most pixels of a picture in a drawing: twice a page at 600 dpi.
+const MOST_PIXELS: u64 = 1 << 26;
+
+/// What the renderer met in a drawing.
+#[derive(Default)]
+pub(super) struct Met {
+    pub pictures: bool,
+    /// What is wrong with the first picture that cannot be drawn, and what to do.
+    pub missing: Option<String>,
+}
+
+/// What is wrong with pictures, by their bytes.
+pub(super) type Known = Arc<Mutex<HashMap<u64, Option<&'static str>>>>;
+
+/// Loads pictures, and takes down what it met.
+pub(super) fn resolver(
+    path: &Path,
+    without: Without,
+    met: &Arc<Mutex<Met>>,
+    known: &Known,
+) -> ImageHrefResolver<'static> {
+    let known = known.clone();
+    let taken = move |met: &Mutex<Met>, found: Result<ImageKind, &str>, name: &str, remedy: &str| {
+        let mut met = met.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = found.and_then(|picture| match fault(&picture, &known) {
+            Some(fault) => Err(fault),
+            None => Ok(picture),
+        });
+        match found {
+            Ok(drawing @ ImageKind::SVG(_)) => Some(drawing),
+            Ok(picture) => {
+                met.pictures = true;
+                (without != Without::Pictures).then_some(picture)
+            }
+            Err(fault) => {
+                met.missing.get_or_insert_with(|| format!("its picture {name} {fault}; {remedy}"));
+                None
+            }
+        }
+    };
+    let (data, in_file) =
+        (ImageHrefResolver::default_data_resolver(), ImageHrefResolver::default_data_resolver());
+    let (of_data, of_link, taken_link) = (met.clone(), met.clone(), taken.clone());
+    let folder = path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new(".")).to_owned();
+    ImageHrefResolver {
+        resolve_data: Box::new(move |mime, bytes, options| {
+            let found = drawable(&bytes).and_then(|()| data(mime, bytes, options).ok_or(UNREADABLE));
+            taken(&of_data, found, &format!("of the type `{mime}`"), "embed it as PNG")
+        }),
+        resolve_string: Box::new(move |href, options| {
+            let found = file(&folder, href).and_then(|bytes| {
+                drawable(&bytes)?;
+                // The kind is told by the bytes.
+                in_file("text/plain", Arc::new(bytes), options).ok_or(UNREADABLE)
+            });
+            let remedy = "put it where the drawing links it, or embed it as PNG";
+            taken_link(&of_link, found, &format!("`{href}`"), remedy)
+        }),
+    }
+}
+
+const UNREADABLE: &str = "cannot be read";
+
+/// The bytes of a linked file, or why there are none.
+fn file(folder: &Path, href: &str) -> Result<Vec<u8>, &'static str> {
+    // Links are addresses, so a space is written `%20`.
+    let local = href.strip_prefix("file://").unwrap_or(href);
+    let plain = percent_decode_str(local).decode_utf8().unwrap_or(Cow::Borrowed(local));
+    let folder = folder.canonicalize().map_err(|_| UNREADABLE)?;
+    let found = |name: &str| folder.join(name).canonicalize();
+    let path: PathBuf = found(local).or_else(|_| found(&plain)).map_err(|_| UNREADABLE)?;
+    if !path.starts_with(&folder) {
+        return Err("lies outside of the folder of the drawing, so it is not read");
+    }
+    let about = path.metadata().map_err(|_| UNREADABLE)?;
+    if !about.is_file() {
+        return Err("is no ordinary file");
+    }
+    if about.len() > MOST_BYTES {
+        return Err("is too large");
+    }
+    let mut bytes = Vec::new();
+    let opened = std::fs::File::open(path).map_err(|_| UNREADABLE)?;
+    opened.take(MOST_BYTES).read_to_end(&mut bytes).map_err(|_| UNREADABLE)?;
+    Ok(bytes)
+}
+
+/// Checks that what may be a drawing has the bounds of one: the renderer would expand and draw it whatever it is.
+fn drawable(bytes: &[u8]) -> Result<(), &'static str> {
+    const EXPANDS: &str = "expands to more than 256 MB";
+    let mut text = Cow::Borrowed(bytes);
+    if bytes.starts_with(b"\x1f\x8b") {
+        let mut unpacked = Vec::new();
+        let unpacking = flate2::read::GzDecoder::new(bytes).take(MOST_BYTES + 1).read_to_end(&mut unpacked);
+        unpacking.map_err(|_| UNREADABLE)?;
+        if unpacked.len() as u64 > MOST_BYTES {
+            return Err(EXPANDS);
+        }
+        text = Cow::Owned(unpacked);
+    }
+    let Some(text) = source::markup(&text) else { return Ok(()) };
+    let Ok(document) = super::parsed(Path::new(""), &text) else { return Err(UNREADABLE) };
+    bounds::check(&document).map_err(|_| "is a drawing that is nested too deeply")
+}
+
+/// Why a picture made of pixels cannot be drawn to its end; the renderer leaves it out in silence.
+fn fault(picture: &ImageKind, known: &Known) -> Option<&'static str> {
+    let (bytes, format) = match picture {
+        ImageKind::JPEG(bytes) => (bytes, ImageFormat::Jpeg),
+        ImageKind::PNG(bytes) => (bytes, ImageFormat::Png),
+        ImageKind::GIF(bytes) => (bytes, ImageFormat::Gif),
+        ImageKind::WEBP(bytes) => (bytes, ImageFormat::WebP),
+        ImageKind::SVG(_) => return None,
+    };
+    let mut hasher = DefaultHasher::new();
+    bytes.hash(&mut hasher);
+    let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
+    *known.entry(hasher.finish()).or_insert_with(|| {
+        const DAMAGED: &str = "is damaged or was cut short, so save it again";
+        if format == ImageFormat::Jpeg && whole_jpeg(Path::new(""), bytes).is_err() {
+            return Some(DAMAGED);
+        }
+        const LARGE: &str = "has too many pixels";
+        let opened = match pictures::open(bytes, format, Bounds { side: None, bytes: 8 * MOST_PIXELS }) {
+            Ok(opened) => opened,
+            Err(ImageError::Limits(_)) => return Some(LARGE),
+            Err(_) => return Some(DAMAGED),
+        };
+        let (width, height) = opened.size();
+        if u64::from(width) * u64::from(height) > MOST_PIXELS {
+            return Some(LARGE);
+        }
+        match Opened::decode(opened) {
+            Ok(_) | Err(ImageError::Unsupported(_)) => None,
+            Err(_) => Some(DAMAGED),
+        }
+    })
+}
