@@ -313,7 +313,7 @@ fn an_eye_sees_what_was_asked() {
 #[test]
 fn an_eye_sees_pictures_as_they_were_asked_for() {
     let pictures = [
-        ("map at 300 dpi", map(), ObjectType::Drawing, 2, 2.6),
+        ("map at 300 dpi", map(), ObjectType::Drawing, 2, 2.0),
         ("screenshot at 150 dpi", screenshot(), ObjectType::Picture, 4, 2.5),
         ("photograph at 300 dpi", photograph(), ObjectType::Picture, 2, 4.0),
     ];
