@@ -215,8 +215,14 @@ fn map() -> Art {
         let height = (x / 61.0).sin() + (y / 83.0 + x / 170.0).cos() + 0.3 * ((x + 2.0 * y) / 37.0).sin();
         let river = (y - 300.0 - 60.0 * (x / 90.0).sin()).abs();
         let road = (x - 200.0 - 50.0 * (y / 120.0).sin()).abs();
-        // Some .1 mm wide.
-        let contour = (height * 6.0).fract().abs() < 0.2;
+        // Contours of .1 mm, 2.4 dots.
+        let slope = [
+            (x / 61.0).cos() / 61.0 - (y / 83.0 + x / 170.0).sin() / 170.0
+                + 0.3 * ((x + 2.0 * y) / 37.0).cos() / 37.0,
+            0.6 * ((x + 2.0 * y) / 37.0).cos() / 37.0 - (y / 83.0 + x / 170.0).sin() / 83.0,
+        ];
+        let level = ((2.0 * height).rem_euclid(1.0) - 0.5).abs() / 2.0;
+        let contour = level < 1.2 * slope[0].hypot(slope[1]);
         match () {
             () if road < 5.0 => [252, 214, 164],
             () if road < 8.0 => GREY,

@@ -144,11 +144,11 @@ fn softened_letters_in_a_plate_with_tones_keep_their_edges() {
         if at % width >= 48 {
             assert_eq!(tone, plate[at]);
         } else {
+            // What is nearly ink or nearly paper may stay a tone.
             let wanted = if plate[at] >= 128 { 255 } else { 0 };
-            assert!(
-                tone == wanted || plate[at].abs_diff(128) < 64 && [0, 255].contains(&tone),
-                "{at}: {tone}"
-            );
+            let is_faint = tone == plate[at] && tone.abs_diff(wanted) <= 12;
+            let may_be_either = plate[at].abs_diff(128) < 64 && [0, 255].contains(&tone);
+            assert!(tone == wanted || is_faint || may_be_either, "{at}: {tone}");
         }
     }
 }
