@@ -148,11 +148,8 @@ fn goes(dots: &HashSet<Dot>, (x, y): Dot, step: usize) -> bool {
     let count = p.iter().filter(|&&set| set).count();
     let turns = (0..8).filter(|&at| !p[at] && p[(at + 1) % 8]).count();
     let (north, east, south, west) = (p[0], p[2], p[4], p[6]);
-    let sides = if step == 0 {
-        !(north && east && south || east && south && west)
-    } else {
-        !(north && east && west || north && south && west)
-    };
+    let sides =
+        if step == 0 { !east || !south || !north && !west } else { !north || !west || !east && !south };
     (2..=6).contains(&count) && turns == 1 && sides
 }
 

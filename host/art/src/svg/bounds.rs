@@ -22,8 +22,8 @@ pub(super) const MOST_DEEP: usize = 512;
 /// The most elements that are drawn.
 pub(super) const MOST_DRAWN: f64 = 2e6;
 
-/// The most bytes of pixels that exist at the same time while a drawing is rendered.
-pub(super) const MOST_BYTES: f64 = 384.0 * 1024.0 * 1024.0;
+/// The most bytes of pixels that exist at the same time while a drawing is rendered: a page of 600 dpi with five layers as large.
+pub(super) const MOST_BYTES: f64 = 768.0 * 1024.0 * 1024.0;
 
 /// The stack of the thread that renders: as much as [`MOST_DEEP`] patterns in each other take, four times.
 pub(super) const STACK: usize = 1 << 26;
@@ -138,18 +138,17 @@ fn rules<'a>(document: &'a roxmltree::Document<'_>) -> HashMap<&'a str, Vec<&'a 
     rules
 }
 
-/// The bytes of pixels that exist at the same time while so many rows of a drawing are rendered, which has `height` rows.
-pub(super) fn need(tree: &usvg::Tree, scale: Transform, (width, rows): (u32, u32), height: u32) -> f64 {
-    let canvas = 4.0 * f64::from(width) * f64::from(rows);
-    let whole = if rows < height { 4.0 * f64::from(width) * f64::from(height) } else { 0.0 };
-    let walk = Walk { width: f64::from(width), rows: f64::from(rows), canvas };
-    whole + canvas + walk.group(tree.root(), scale)
+/// The bytes of pixels that exist at the same time while a drawing is rendered.
+pub(super) fn need(tree: &usvg::Tree, scale: Transform, (width, height): (u32, u32)) -> f64 {
+    let canvas = 4.0 * f64::from(width) * f64::from(height);
+    let walk = Walk { width: f64::from(width), height: f64::from(height), canvas };
+    canvas + walk.group(tree.root(), scale)
 }
 
 /// The canvas of a walk.
 struct Walk {
     width: f64,
-    rows: f64,
+    height: f64,
     /// Its bytes.
     canvas: f64,
 }
@@ -161,7 +160,7 @@ impl Walk {
         const BORDER: f64 = 4.0;
         let Some(bounds) = bounds.transform(transform) else { return 0.0 };
         let side = |side: f32, most: f64| (f64::from(side) + BORDER).min(5.0 * most);
-        4.0 * side(bounds.width(), self.width) * side(bounds.height(), self.rows)
+        4.0 * side(bounds.width(), self.width) * side(bounds.height(), self.height)
     }
 
     fn group(&self, group: &usvg::Group, transform: Transform) -> f64 {
@@ -271,22 +270,18 @@ mod tests {
 
     #[test]
     fn memory_is_that_of_tiles_layers_and_pictures_at_the_same_time() {
-        let of = |inside: &str, rows: u32| {
+        let of = |inside: &str| {
             let text =
                 format!("<svg xmlns='http://www.w3.org/2000/svg' width='100' height='100'>{inside}</svg>");
             let tree = usvg::Tree::from_str(&text, &usvg::Options::default()).unwrap();
-            need(&tree, Transform::from_scale(2.0, 2.0), (200, rows), 200)
+            need(&tree, Transform::from_scale(2.0, 2.0), (200, 200))
         };
         let canvas = 4.0 * 200.0 * 200.0;
-        assert_eq!(of("<rect width='9' height='9'/>", 200), canvas);
-        assert_eq!(of("<rect width='9' height='9'/>", 50), canvas + canvas / 4.0);
+        assert_eq!(of("<rect width='9' height='9'/>"), canvas);
         let tile = "<pattern id='p' width='1000' height='50' patternUnits='userSpaceOnUse'><circle r='9'/></pattern>\
             <rect width='9' height='9' fill='url(#p)'/>";
-        assert_eq!(of(tile, 200), canvas + 4.0 * 2000.0 * 100.0);
-        // A tile does not shrink with the band, a layer does.
-        assert_eq!(of(tile, 50), canvas + canvas / 4.0 + 4.0 * 2000.0 * 100.0);
+        assert_eq!(of(tile), canvas + 4.0 * 2000.0 * 100.0);
         let layers = "<g opacity='.5'><g opacity='.5'><rect width='50' height='9999'/></g></g>";
-        assert_eq!(of(layers, 200), canvas + 2.0 * 4.0 * 104.0 * 1000.0);
-        assert_eq!(of(layers, 50), canvas + canvas / 4.0 + 2.0 * 4.0 * 104.0 * 250.0);
+        assert_eq!(of(layers), canvas + 2.0 * 4.0 * 104.0 * 1000.0);
     }
 }

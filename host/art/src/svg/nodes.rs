@@ -49,8 +49,8 @@ pub(super) fn is_drawn(node: Node<'_, '_>) -> bool {
 /// What an element itself says of a property, in its style or else in an attribute. Style sheets are not looked at.
 pub(super) fn property<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
     let style = node.attribute("style").unwrap_or_default();
-    let parts = style.split(';').filter_map(|part| part.split_once(':'));
-    let own = parts.filter(|(known, _)| known.trim() == name).next_back().map(|(_, value)| value);
+    let mut parts = style.split(';').filter_map(|part| part.split_once(':'));
+    let own = parts.rfind(|(known, _)| known.trim() == name).map(|(_, value)| value);
     own.or_else(|| node.attribute(name)).map(|value| value.trim().trim_end_matches("!important").trim_end())
 }
 

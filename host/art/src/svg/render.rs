@@ -3,9 +3,9 @@
 //! Problem: the renderer leaves out what it cannot load, and says so nowhere. It gives each layer of the drawing as much memory as
 //! the drawing, or many times that.
 //! Method: pictures ([`links`](super::links)) and fonts are loaded here, so a picture that is missing or damaged is an error, and a
-//! drawing can also be rendered without its pictures or its text. A drawing that needs too much memory is rendered in bands of rows; if
-//! that does not help, it is an error ([`bounds`](super::bounds)). Cost: four bytes a dot, and the time of a drawing for each band.
-//! Limits: filters that reach further than two bands end there.
+//! drawing can also be rendered without its pictures or its text. A drawing that needs too much memory is an error
+//! ([`bounds`](super::bounds)). Cost: four bytes a dot. Limits: layers cannot be made smaller: the renderer gives them up to five times
+//! the height of whatever part is rendered, so that bands of rows took longer and hardly less.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -18,9 +18,6 @@ use super::super::error::wrong;
 use super::fonts::{DEFAULT, Fonts};
 use super::links::{Known, Met};
 use super::{bounds, links, thin};
-
-/// The fewest rows that are rendered at once if layers of them would need more memory than [`bounds::MOST_BYTES`].
-const FEWEST_ROWS: u32 = 64;
 
 /// What is left out of a rendering.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -97,43 +94,17 @@ impl Renderer {
         let options = self.options(Without::Nothing, &Arc::default());
         let thick = thin::thickened(&drawn.tree, scale, &options);
         let tree = thick.as_ref().unwrap_or(&drawn.tree);
-        let rows = self.rows(tree, scale, (width, height))?;
-        let blank =
-            |rows| Pixmap::new(width, rows).ok_or_else(|| wrong(&self.path, "the drawing is too large"));
-        if rows == height {
-            let mut pixmap = blank(height)?;
-            resvg::render(tree, scale, &mut pixmap.as_mut());
-            return Ok(straight(pixmap));
+        let need = bounds::need(tree, scale, (width, height));
+        if need > bounds::MOST_BYTES {
+            let problem = format!("drawing it needs {:.0} MB of memory", need / f64::from(1 << 20));
+            return Err(wrong(&self.path, problem).hint(
+                "make the tiles of its patterns smaller and nest fewer groups with clips, masks or opacity, or export it as PNG",
+            ));
         }
-        let mut all = Vec::with_capacity(4 * width as usize * height as usize);
-        for top in (0..height).step_by(rows as usize) {
-            let mut band = blank(rows.min(height - top))?;
-            resvg::render(tree, scale.post_translate(0.0, -(top as f32)), &mut band.as_mut());
-            all.append(&mut straight(band));
-        }
-        Ok(all)
-    }
-
-    /// How many rows to render at once, so that a drawing needs no more memory than it may.
-    fn rows(
-        &self,
-        tree: &usvg::Tree,
-        scale: Transform,
-        (width, height): (u32, u32),
-    ) -> Result<u32, Diagnosis> {
-        let mut rows = height;
-        loop {
-            let need = bounds::need(tree, scale, (width, rows), height);
-            if need <= bounds::MOST_BYTES {
-                return Ok(rows);
-            }
-            if rows <= FEWEST_ROWS {
-                let problem = format!("drawing it needs {:.0} MB of memory", need / f64::from(1 << 20));
-                return Err(wrong(&self.path, problem)
-                    .hint("make the tiles of its patterns smaller and nest fewer groups with clips, masks or opacity, or export it as PNG"));
-            }
-            rows = rows.div_ceil(2).max(FEWEST_ROWS);
-        }
+        let mut pixmap =
+            Pixmap::new(width, height).ok_or_else(|| wrong(&self.path, "the drawing is too large"))?;
+        resvg::render(tree, scale, &mut pixmap.as_mut());
+        Ok(straight(pixmap))
     }
 
     fn options(&self, without: Without, met: &Arc<Mutex<Met>>) -> usvg::Options<'static> {

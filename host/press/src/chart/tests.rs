@@ -272,7 +272,7 @@ fn the_first_sheet_has_four_bars_where_a_ruler_looks_for_them_in_a_job_of_less_t
             name: "first",
             dots: &chart,
             layout: &layout,
-            handling: Default::default(),
+            handling: crate::job::Handling { media: protocol::rgl::Media::Plain, curl_correction: true },
             allowed,
             library: &library,
         };
