@@ -268,9 +268,9 @@ fn is_cut_short(path: &Path) -> bool {
 /// # Errors
 /// Those of opening it.
 pub(super) fn is_pdf(path: &Path) -> io::Result<bool> {
-    let mut start = [0; 4];
-    let mut file = File::open(path)?;
-    Ok(file.read_exact(&mut start).is_ok() && &start == b"%PDF")
+    let mut start = Vec::new();
+    File::open(path)?.take(super::HEADER as u64).read_to_end(&mut start)?;
+    Ok(super::is_pdf(&start))
 }
 
 #[cfg(test)]

@@ -39,16 +39,6 @@ const NO_COPIES: &str = "userdict begin \
     /selectfont { 1 index type /nametype eq { exch findfont exch } if systemdict /selectfont get exec } bind def /setpagedevice { dup /NumCopies known { dup length dict copy dup /NumCopies undef } if \
     systemdict /setpagedevice get exec } bind def end";
 
-/// Whether a document is PDF.
-///
-/// # Errors
-/// Those of opening it.
-pub(super) fn is_pdf(path: &Path) -> io::Result<bool> {
-    let mut start = Vec::new();
-    File::open(path)?.take(super::HEADER as u64).read_to_end(&mut start)?;
-    Ok(super::is_pdf(&start))
-}
-
 /// Ghostscript's interpreter of PDF.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Interpreter {
