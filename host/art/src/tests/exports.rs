@@ -405,7 +405,7 @@ fn kinds_of_tiff_that_scanners_and_programs_write_are_read() {
         assert!(words.is_empty() || noted(&art, words), "{name}: {:?}", art.notes);
     }
     // What is not read says why in words of its owner.
-    let mut zstd = tiff_file(size, &[ink.clone()], 1, &[]);
+    let mut zstd = tiff_file(size, std::slice::from_ref(&ink), 1, &[]);
     let entry = zstd.windows(4).rposition(|tag| tag == [3, 1, 3, 0]).unwrap();
     zstd[entry + 8..entry + 10].copy_from_slice(&short(50_000));
     let said = refused(&[bench.write("art.tif", zstd)]);
