@@ -171,8 +171,8 @@ impl Walk {
         }
         let layer = self.layer(group.layer_bounding_box().to_rect(), transform);
         let mut beside = within;
-        // A filter has a picture of its own for each of its steps at most, and the result.
-        let steps = group.filters().iter().map(|filter| filter.primitives().len()).max().unwrap_or(0);
+        // A step of a filter has what it reads and what it makes; many steps are the time limit's affair.
+        let steps = group.filters().iter().map(|filter| filter.primitives().len().min(2)).max().unwrap_or(0);
         beside = beside.max(layer * (steps + usize::from(steps > 0)) as f64);
         let mut clip = group.clip_path();
         let mut clips = 0.0;
