@@ -37,7 +37,7 @@ mod usb;
 mod watch;
 
 use bridge::alone::Alone;
-use bridge::engine::{Engine, Identity, Memory};
+use bridge::engine::{Checkpoint, Engine, Identity, Memory};
 use bridge::turn::{self, Turn};
 use core::ffi::CStr;
 use embassy_executor::Spawner;
@@ -92,6 +92,10 @@ async fn main(spawner: Spawner) {
 
     // Before the first word of the log, and before a byte goes to the printer.
     let (checkpoints, checkpoint, known) = retained::checkpoints();
+    let reason = pac::WATCHDOG.reason().read();
+    // RUN, or a supply that sags: it may have come within a strobe.
+    let from_outside = !reason.timer() && !reason.force();
+    let checkpoint = if from_outside { checkpoint.map(Checkpoint::reset_from_outside) } else { checkpoint };
     let used_before = stack::used();
     stack::fill();
 
@@ -114,7 +118,6 @@ async fn main(spawner: Spawner) {
     static DECODER: StaticCell<Decoder> = StaticCell::new();
     let decoder = DECODER.init_with(Decoder::default);
     let memory = Memory { data: DATA.take(), output: OUTPUT.take(), band: BAND.take(), decoder };
-    let reason = pac::WATCHDOG.reason().read();
     defmt::info!(
         "bridge {=str} {=u64:x} up on a {=str}, after {=str}",
         identity.firmware,
@@ -130,7 +133,7 @@ async fn main(spawner: Spawner) {
         defmt::info!("the run before used {=u32} of {=u32} bytes of stack", used_before, stack::size());
     }
     if let Some(checkpoint) = &checkpoint {
-        let bridge::engine::Checkpoint { progress, .. } = checkpoint;
+        let Checkpoint { progress, .. } = checkpoint;
         defmt::info!(
             "job {=u32:08x} from before: {}, {=u32} bytes printed",
             progress.job,

@@ -5,14 +5,18 @@
 //! either hangs, or another one keeps the processor, the board restarts after eight seconds. During the reset a resistor
 //! holds nOE high, so the printer sees nothing of it. The library decides what the lamp shows
 //! ([`bridge::lamp`]) and what a press of the button means ([`bridge::button`]).
+//!
+//! A host may give up a control request in the middle: its process has died, or the cable has had a glitch. The USB stack
+//! (embassy-usb 0.6, embassy-rp 0.10) then waits for the rest of that request, and looks at no bus reset any more. So a bus reset
+//! that nobody has served for 100 ms restarts the board, with no byte cut in two. The job goes on after it.
 
-use crate::pins;
 use crate::shared::{Shared, Side};
+use crate::{pins, strobe};
 use bridge::button::Button;
 use bridge::lamp::{self, Lamp};
-use embassy_rp::Peri;
 use embassy_rp::peripherals::WATCHDOG;
 use embassy_rp::watchdog::Watchdog;
+use embassy_rp::{Peri, pac};
 use embassy_time::{Duration, Instant, Timer};
 use portable_atomic::{AtomicBool, Ordering};
 
@@ -33,6 +37,9 @@ const LOOK_MS: u32 = 10;
 
 const PATIENCE: Duration = Duration::from_secs(8);
 
+/// A bus reset may be unserved for so many looks: 100 ms.
+const UNSERVED: u32 = 10;
+
 /// A task has gone round its loop.
 pub fn show_life(who: Life) {
     ALIVE[who as usize].store(true, Ordering::Relaxed);
@@ -48,7 +55,7 @@ pub fn start(watchdog: Peri<'static, WATCHDOG>) -> Watchdog {
 /// Runs all three.
 #[embassy_executor::task]
 pub async fn run(shared: &'static Shared, mut watchdog: Watchdog) -> ! {
-    let (mut lamp, mut button) = (Lamp::new(), Button::new());
+    let (mut lamp, mut button, mut unserved) = (Lamp::new(), Button::new(), 0);
     loop {
         pins::lamp(shared.engine(|engine| lamp.next(engine)));
         if ALIVE.iter().all(|alive| alive.load(Ordering::Relaxed)) {
@@ -61,6 +68,14 @@ pub async fn run(shared: &'static Shared, mut watchdog: Watchdog) -> ! {
                 shared.engine(|engine| engine.press(press));
                 shared.wake(Side::Store);
                 shared.wake(Side::Port);
+            }
+            unserved = if pac::USB.sie_status().read().bus_reset() { unserved + 1 } else { 0 };
+            if unserved > UNSERVED {
+                defmt::warn!("a bus reset is not served: the board restarts");
+                cortex_m::interrupt::disable();
+                strobe::halt();
+                pins::enable(false);
+                watchdog.trigger_reset();
             }
             Timer::after(Duration::from_millis(LOOK_MS.into())).await;
         }

@@ -5,11 +5,12 @@
 //! Method: a folder for the whole computer. Before the first byte of a job leaves, the file `open.PRINTER.JOB` is made durable
 //! there. It is removed when the job is known to have ended in an orderly way, or when the printer was reset. So a crash
 //! leaves it behind, whatever crashed. The folder is sticky: nobody can remove a file of another user. Whoever learns that
-//! another user's job has ended writes `closed.PRINTER.JOB` instead, which counts the same. Files are [durable]
-//! and whole; links are never followed.
+//! another user's job has ended writes `closed.PRINTER.JOB` instead. It counts for whoever wrote it, and for everybody if root or the
+//! owner of the open note did: this program cannot know whether another user may open the bridge. Files are [durable] and
+//! whole; links are never followed; a folder with a note's name is none.
 //! A bridge is known by its serial number, however it is reached, because it has one port. A raw device is known by its path.
 //! Limits: another computer that shares a bridge over the network does not see the folder. A user who may print may also
-//! write false facts here, as they may send false bytes to the printer: the worst that follows is a needless reset.
+//! write false facts here: the worst that follows is a needless reset.
 //! Source: `docs/decisions/reset-owed-by-the-printer.md`.
 
 use std::fmt;
@@ -146,6 +147,10 @@ fn io_error(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Printe
     move |source| PrintersError::Io { what, path, source }
 }
 
+/// What was noted at some moment.
+#[derive(Clone, Debug)]
+pub struct Noted(Vec<String>);
+
 /// The folder of facts about printers.
 #[derive(Clone, Debug)]
 pub struct Printers {
@@ -254,29 +259,33 @@ impl Printers {
         let mut found = Vec::new();
         for name in self.names()? {
             let Some(job) = name.strip_prefix(&prefix) else { continue };
-            if self.folder.join(closed(&name)).symlink_metadata().is_err() {
+            let path = self.folder.join(&name);
+            if is_note(&path) && !is_closed(&path, &self.folder.join(closed(&name))) {
                 found.push(Unfinished { job: job.to_owned(), boot: self.boot(&name) });
             }
         }
         Ok(found)
     }
 
-    /// Notes that a printer was reset and holds nothing any more; without one, that all were.
-    pub fn reset(&self, printer: Option<&Printer>) -> Result<(), PrintersError> {
-        let of = printer.map(|printer| format!("open.{}.", printer.file_name()));
-        for name in self.names()? {
-            let mut parts = name.splitn(3, '.');
-            if parts.next() != Some("open") || of.as_ref().is_some_and(|of| !name.starts_with(of)) {
-                continue;
-            }
-            let path = self.folder.join(&name);
+    /// What is noted of a printer now; without one, of all. To be asked for before the printer is reset: a job that begins
+    /// behind the reset has a note of its own.
+    pub fn noted(&self, printer: Option<&Printer>) -> Result<Noted, PrintersError> {
+        let of = printer.map_or_else(|| "open.".into(), |printer| format!("open.{}.", printer.file_name()));
+        let notes = |name: &String| name.starts_with(&of) && is_note(&self.folder.join(name));
+        Ok(Noted(self.names()?.into_iter().filter(notes).collect()))
+    }
+
+    /// Notes that a printer was reset and holds nothing any more of what was noted before.
+    pub fn reset(&self, noted: &Noted) -> Result<(), PrintersError> {
+        for name in &noted.0 {
+            let path = self.folder.join(name);
             match fs::remove_file(&path) {
                 Ok(()) => {
-                    let _ = fs::remove_file(self.folder.join(closed(&name)));
+                    let _ = fs::remove_file(self.folder.join(closed(name)));
                 }
                 Err(error) if error.kind() == io::ErrorKind::NotFound => {}
                 Err(error) if error.kind() == io::ErrorKind::PermissionDenied => {
-                    self.write(&self.folder.join(closed(&name)), &Fact { boot: None, since: 0 })?;
+                    self.write(&self.folder.join(closed(name)), &Fact { boot: None, since: 0 })?;
                 }
                 Err(error) => return Err(io_error("remove", &path)(error)),
             }
@@ -320,9 +329,12 @@ impl Printers {
         for name in self.names().unwrap_or_default() {
             if let Some(rest) = name.strip_prefix("closed.") {
                 let open = self.folder.join(format!("open.{rest}"));
+                let closed = self.folder.join(&name);
                 // The open one first: without it the other means nothing.
-                if fs::remove_file(&open).is_ok() || open.symlink_metadata().is_err() {
-                    let _ = fs::remove_file(self.folder.join(&name));
+                if is_closed(&open, &closed) && fs::remove_file(&open).is_ok()
+                    || open.symlink_metadata().is_err()
+                {
+                    let _ = fs::remove_file(closed);
                 }
             }
         }
@@ -332,6 +344,26 @@ impl Printers {
 /// The name of the file that says that a printer does not negotiate.
 fn one_way(printer: &Printer) -> String {
     format!("one-way.{}", printer.file_name())
+}
+
+/// Whether this is a note, or a link in its place. A folder, or whatever else somebody has put there, is none.
+fn is_note(path: &Path) -> bool {
+    path.symlink_metadata().is_ok_and(|found| found.is_file() || found.is_symlink())
+}
+
+/// Whether an open note is closed by somebody whose word counts.
+fn is_closed(open: &Path, closed: &Path) -> bool {
+    let Ok(found) = closed.symlink_metadata() else { return false };
+    #[cfg(unix)]
+    let counts = {
+        use std::os::unix::fs::MetadataExt as _;
+        let me = rustix::process::geteuid().as_raw();
+        let owner = open.symlink_metadata().map(|open| open.uid()).ok();
+        found.uid() == 0 || found.uid() == me || Some(found.uid()) == owner
+    };
+    #[cfg(not(unix))]
+    let counts = open.symlink_metadata().is_ok();
+    found.is_file() && counts
 }
 
 /// The name of the file that closes the one of this name.
@@ -385,9 +417,14 @@ mod tests {
         let left = Unfinished { job: "0000000b".into(), boot: Some(5) };
         // Another process sees the same.
         assert_eq!(Printers::at(folder.path()).unwrap().unfinished(&one).unwrap(), [left]);
-        printers.reset(Some(&one)).unwrap();
+        // One that begins behind the reset stays.
+        let noted = printers.noted(Some(&one)).unwrap();
+        printers.begin(&one, "0000000d", Some(5)).unwrap();
+        printers.reset(&noted).unwrap();
+        assert_eq!([&one, &two, &device].map(count), [1, 1, 1]);
+        printers.reset(&printers.noted(Some(&one)).unwrap()).unwrap();
         assert_eq!([&one, &two, &device].map(count), [0, 1, 1]);
-        printers.reset(None).unwrap();
+        printers.reset(&printers.noted(None).unwrap()).unwrap();
         assert_eq!([&one, &two, &device].map(count), [0, 0, 0]);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }
@@ -403,6 +440,26 @@ mod tests {
         printers.begin(&printer, "0000000b", Some(5)).unwrap();
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
         assert_eq!(printers.unfinished(&printer).unwrap().len(), 1);
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn what_a_stranger_has_closed_stays_open_and_a_folder_in_place_of_a_note_is_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let printers = Printers::at(folder.path()).unwrap();
+        let printer = Printer::Bridge(1);
+        fs::create_dir(folder.path().join("open.bridge-0000000000000001.0000000f")).unwrap();
+        printers.begin(&printer, "0000000a", Some(5)).unwrap();
+        let closed = folder.path().join("closed.bridge-0000000000000001.0000000a");
+        fs::write(&closed, "{}").unwrap();
+        assert_eq!(printers.unfinished(&printer).unwrap(), []);
+        // Where the test may choose whose a file is.
+        if std::os::unix::fs::lchown(&closed, Some(65_534), None).is_ok() {
+            printers.begin(&printer, "0000000b", Some(5)).unwrap();
+            assert_eq!(printers.unfinished(&printer).unwrap().len(), 2);
+        }
+        printers.reset(&printers.noted(None).unwrap()).unwrap();
+        assert_eq!(printers.unfinished(&printer).unwrap(), []);
     }
 
     #[test]
@@ -481,7 +538,7 @@ mod tests {
         }
         assert_eq!(printers.unfinished(&one).unwrap(), []);
         // A reset is no other printer.
-        printers.reset(None).unwrap();
+        printers.reset(&printers.noted(None).unwrap()).unwrap();
         assert!(printers.is_one_way(&one));
         for _ in 0..2 {
             printers.note_one_way(&one, false).unwrap();

@@ -479,7 +479,7 @@ mod tests {
         rig.call.identity = "one".into();
         assert_eq!(rig.run(&bytes, &|| false).0, Exit::Ok);
         rig.printers.begin(&printer, "raw-1-2", None).unwrap();
-        rig.printers.reset(None).unwrap();
+        rig.printers.reset(&rig.printers.noted(None).unwrap()).unwrap();
         rig.call.identity = "three".into();
         assert_eq!(rig.run(&bytes, &|| false).0, Exit::Ok);
     }

@@ -25,11 +25,13 @@ mod raw;
 pub mod store;
 
 use std::borrow::Cow;
+use std::time::Duration;
 
 use protocol::ink::Ink;
 use protocol::link::message::{JobKind, Progress};
 
-use crate::connection::{Address, OpenError};
+use crate::connection::transport::Transport;
+use crate::connection::{Address, OpenError, find};
 use crate::forms::{Checked, Content, streams};
 use crate::ledger::{self, Ledger, PassUse};
 use crate::printers::{Printer, Printers, PrintersError};
@@ -67,6 +69,16 @@ pub trait Caller {
 
     /// Watches the stages in which a job is prepared.
     fn observer(&self) -> &dyn Observer;
+
+    /// Opens a way to the bridge at this address; with its serial number, wherever it is now.
+    fn open(&self, address: &Address, bridge: Option<u64>) -> Result<Box<dyn Transport>, OpenError> {
+        find::open(address, bridge)
+    }
+
+    /// Waits.
+    fn pause(&self, time: Duration) {
+        std::thread::sleep(time);
+    }
 }
 
 /// What happens to a job.
@@ -290,8 +302,13 @@ impl<'a> Packed<'a> {
         let (content, bytes) = (job.content, job.content.bytes());
         match streams::of(content, observer).filter(|streams| streams.len() < bytes.len()) {
             Some(streams) => Packed { job, kind: JobKind::Streams, data: streams.into() },
-            None => Packed { job, kind: JobKind::Raw, data: bytes.into() },
+            None => Packed::raw(job),
         }
+    }
+
+    /// The job byte for byte.
+    pub fn raw(job: Job<'a>) -> Packed<'a> {
+        Packed { job, kind: JobKind::Raw, data: job.content.bytes().into() }
     }
 
     /// What people call it.

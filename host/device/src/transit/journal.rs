@@ -121,13 +121,14 @@ pub struct NewJob<'a> {
 }
 
 /// A number for a job that no other job of this or another computer has: time, process, content and place say so well enough, and a
-/// bridge that knows the number as another job's refuses it.
+/// bridge that knows the number as another job's refuses it. All are equally long on the link.
 pub fn fresh_number(content: u32, place: &[u8]) -> u32 {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let seed =
         [&now.as_nanos().to_le_bytes()[..], &std::process::id().to_le_bytes(), &content.to_le_bytes(), place]
             .concat();
-    (protocol::link::frame::checksum(&seed) % ALONE).max(1)
+    const LEAST: u32 = 1 << 28;
+    LEAST + protocol::link::frame::checksum(&seed) % (ALONE - LEAST)
 }
 
 impl Journal {

@@ -120,13 +120,14 @@ pub fn store(job: Job<'_>, to: &Destination, observer: &dyn Observer) -> Result<
     let Destination::Bridge(address) = to else {
         bail!("--store needs a bridge as the destination: usb:, serial:PORT or tcp:HOST:PORT");
     };
+    let terminal = Terminal::new(false, true, observer);
     // Before the job is coded: a mistyped address is told at once.
-    let shelf = device::deliver::store::shelf(address).map_err(|failure| not_stored(job.name, failure))?;
+    let shelf =
+        device::deliver::store::shelf(address, &terminal).map_err(|failure| not_stored(job.name, failure))?;
     let packed = Packed::new(job, observer);
     let size = size_text(packed.kind(), packed.data().len() as u64, job.content.bytes().len() as u64);
     let stored = shelf_text(&shelf).unwrap_or_else(|| "no room for jobs".into());
     observer.note(&format!("{}: {size}; the bridge has {stored}", job.name));
-    let terminal = Terminal::new(false, true, observer);
     output::say_on_interrupt("what is stored of the job does not count; store it again");
     let number = device::deliver::store::store(&packed, address, &terminal)
         .map_err(|failure| not_stored(job.name, failure))?;

@@ -1,0 +1,64 @@
+//! The printer: what has crossed its port since it last stood between two jobs, and what it says of itself.
+//!
+//! Its status lags: it says idle for seconds behind the last byte of a sheet, and then prints for half a minute (as the MD-5000
+//! does on a parallel port). Time is in µs.
+
+use model::is_a_whole_job;
+
+/// The printer.
+pub struct Printer {
+    /// Bytes since it stood between two jobs; with a part of a sheet it waits for the rest.
+    pub since: Vec<u8>,
+    /// The job whose bytes these are, as the bridge numbers it.
+    pub owner: u32,
+    /// It is without supply until then.
+    pub off_until: u64,
+    /// It is out of paper until then.
+    pub paper_out_until: u64,
+    /// When the last byte of a whole sheet came.
+    whole_at: Option<u64>,
+    /// How long its status says idle behind a sheet, and for how long it then prints.
+    lag: (u64, u64),
+}
+
+impl Printer {
+    /// A printer between two jobs, with this lag.
+    pub fn new(lag: (u64, u64)) -> Printer {
+        Printer { since: Vec::new(), owner: 0, off_until: 0, paper_out_until: 0, whole_at: None, lag }
+    }
+
+    /// Whether it waits for the rest of a sheet.
+    pub fn holds_a_part(&self) -> bool {
+        !self.since.is_empty() && !is_a_whole_job(&self.since)
+    }
+
+    /// It was reset, or switched off: gives the part of a sheet that is lost with that.
+    pub fn reset(&mut self) -> Option<(u32, Vec<u8>)> {
+        let part = self.holds_a_part();
+        let since = std::mem::take(&mut self.since);
+        self.whole_at = self.whole_at.filter(|_| !part);
+        part.then_some((self.owner, since))
+    }
+
+    /// A whole sheet has come.
+    pub fn whole(&mut self, now: u64) -> Vec<u8> {
+        self.whole_at = Some(now);
+        std::mem::take(&mut self.since)
+    }
+
+    /// Whether the last sheet is out.
+    pub fn is_out(&self, now: u64) -> bool {
+        self.whole_at.is_none_or(|at| now >= at + self.lag.0 + self.lag.1)
+    }
+
+    /// Its answer to the status question.
+    pub fn status(&self, now: u64) -> [u8; 38] {
+        let prints =
+            self.whole_at.is_some_and(|at| (at + self.lag.0..at + self.lag.0 + self.lag.1).contains(&now));
+        let mut answer = [0xff; 38];
+        answer[..5].copy_from_slice(&[2, 0x80, 33, 0, if prints { 0x18 } else { 0x10 }]);
+        answer[32..37].fill(0);
+        answer[37] = 3;
+        answer
+    }
+}
