@@ -6,13 +6,13 @@
 //! holds nOE high, so the printer sees nothing of it. The library decides what the lamp shows
 //! ([`bridge::lamp`]) and what a press of the button means ([`bridge::button`]).
 //!
-//! A host may give up a control request in the middle: its process has died, or the cable has had a glitch. The USB stack
-//! (embassy-usb 0.6, embassy-rp 0.10) then waits for the rest of that request, and looks at no bus reset any more. So a bus reset
-//! that nobody has served for 100 ms restarts the board, with no byte cut in two. The job goes on after it.
+//! A USB controller that hears nothing any more ([`bridge::deaf`]) restarts the board, with no byte cut in two; the job goes on
+//! after it.
 
 use crate::shared::{Shared, Side};
 use crate::{pins, strobe};
 use bridge::button::Button;
+use bridge::deaf::{Deaf, LOOK_MS, Shown};
 use bridge::lamp::{self, Lamp};
 use embassy_rp::peripherals::WATCHDOG;
 use embassy_rp::watchdog::Watchdog;
@@ -32,13 +32,7 @@ pub enum Life {
 /// They have, since the watchdog was last fed.
 static ALIVE: [AtomicBool; 2] = [const { AtomicBool::new(false) }; 2];
 
-/// Between two looks at the button: a tap takes some 60 ms.
-const LOOK_MS: u32 = 10;
-
 const PATIENCE: Duration = Duration::from_secs(8);
-
-/// A bus reset may be unserved for so many looks: 100 ms.
-const UNSERVED: u32 = 10;
 
 /// A task has gone round its loop.
 pub fn show_life(who: Life) {
@@ -55,7 +49,7 @@ pub fn start(watchdog: Peri<'static, WATCHDOG>) -> Watchdog {
 /// Runs all three.
 #[embassy_executor::task]
 pub async fn run(shared: &'static Shared, mut watchdog: Watchdog) -> ! {
-    let (mut lamp, mut button, mut unserved) = (Lamp::new(), Button::new(), 0);
+    let (mut lamp, mut button, mut deaf) = (Lamp::new(), Button::new(), Deaf::new());
     loop {
         pins::lamp(shared.engine(|engine| lamp.next(engine)));
         if ALIVE.iter().all(|alive| alive.load(Ordering::Relaxed)) {
@@ -69,9 +63,13 @@ pub async fn run(shared: &'static Shared, mut watchdog: Watchdog) -> ! {
                 shared.wake(Side::Store);
                 shared.wake(Side::Port);
             }
-            unserved = if pac::USB.sie_status().read().bus_reset() { unserved + 1 } else { 0 };
-            if unserved > UNSERVED {
-                defmt::warn!("a bus reset is not served: the board restarts");
+            let shown = Shown {
+                reset: pac::USB.sie_status().read().bus_reset(),
+                address: pac::USB.addr_endp().read().address(),
+                frame: pac::USB.sof_rd().read().count(),
+            };
+            if deaf.look(shown) {
+                defmt::warn!("USB hears nothing: the board restarts");
                 cortex_m::interrupt::disable();
                 strobe::halt();
                 pins::enable(false);
