@@ -43,6 +43,13 @@ export const legal = (printer, least = STANDARD) => {
   return shortest;
 };
 
+/// What an image may take and do.
+export function budgets(image) {
+  const text = readFileSync(new URL('../../xtask/budgets.toml', import.meta.url), 'utf8');
+  const [, section] = text.split(`[${image}]`);
+  return Object.fromEntries([...section.split('\n[')[0].matchAll(/^(\w+) = (\d+)/gm)].map(([, key, value]) => [key, Number(value)]));
+}
+
 export const job = (name) => new Uint8Array(readFileSync(join(jobs, name)));
 
 export class Bench {
