@@ -74,7 +74,13 @@ impl Engine<'_> {
                     self.end(JobState::Lost);
                     self.owes_reset = true;
                 }
-                self.between_jobs(Task::Initialise);
+                // One of which nothing has been made for the port yet is printed behind the reset.
+                let untouched = |job: &Job| job.printed == 0 && self.output.is_empty();
+                if self.job.as_ref().is_some_and(untouched) {
+                    self.unless_busy(Task::Initialise);
+                } else {
+                    self.between_jobs(Task::Initialise);
+                }
             }
             ToBridge::Bootloader => self.between_jobs(Task::Bootloader),
             ToBridge::Drive { data, control } => self.between_jobs(Task::Drive { data, control }),

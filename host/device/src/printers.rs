@@ -116,7 +116,7 @@ impl Unfinished {
     }
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(PartialEq, Eq, Default, Serialize, Deserialize)]
 struct Fact {
     boot: Option<u32>,
     /// When it was written, in seconds since 1970: for whoever looks into the folder.
@@ -161,7 +161,7 @@ pub struct Printers {
 
 impl Printers {
     /// The computer's folder: `FOILPRESS_PRINTERS`; else the folder all users share, if it is there and can be written; else one
-    /// of this user's own, which [`Printers::note`] then tells.
+    /// of this user's own, which [`Printers::notes`] then tell.
     pub fn of_system() -> Result<Printers, PrintersError> {
         if let Some(folder) = std::env::var_os("FOILPRESS_PRINTERS").filter(|value| !value.is_empty()) {
             return Printers::at(Path::new(&folder));
@@ -178,7 +178,7 @@ impl Printers {
 
     /// The facts in this folder, which is made if need be.
     pub fn at(folder: &Path) -> Result<Printers, PrintersError> {
-        durable::make_folder(folder).map_err(io_error("make", folder))?;
+        durable::make_folder(folder, Access::Everyone).map_err(io_error("make", folder))?;
         Ok(Printers { folder: folder.to_path_buf(), instead_of: None })
     }
 
@@ -187,15 +187,25 @@ impl Printers {
         &self.folder
     }
 
-    /// What the user should know when the facts are not shared.
-    pub fn note(&self) -> Option<String> {
-        self.instead_of.as_ref().map(|shared| {
+    /// What the user should know: that the facts are not shared, and what lies among them and is none.
+    pub fn notes(&self) -> Vec<String> {
+        let shared = self.instead_of.as_ref().map(|shared| {
             format!(
                 "{} cannot be written, so other users and print queues do not learn of a job that leaves the printer in need of \
                  a reset; the Debian package and `foilpress queue install` make that folder",
                 shared.display()
             )
-        })
+        });
+        let names = self.names().unwrap_or_default();
+        let rubbish =
+            names.into_iter().find(|name| name.starts_with("open.") && !is_note(&self.folder.join(name)));
+        let rubbish = rubbish.map(|name| {
+            format!(
+                "{} is no file of this program and says nothing of a printer; remove it",
+                self.folder.join(crate::connection::printable(&name)).display()
+            )
+        });
+        shared.into_iter().chain(rubbish).collect()
     }
 
     /// Notes, before its first byte leaves, that the printer may hold a part of this job. When this returns it is on disk. The
@@ -246,8 +256,7 @@ impl Printers {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
             // Another user's, in a sticky folder.
             Err(error) if error.kind() == io::ErrorKind::PermissionDenied => {
-                let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
-                self.write(&self.path("closed", printer, job), &Fact { boot: None, since })
+                self.write(&self.path("closed", printer, job), &fact(&open).unwrap_or_default())
             }
             Err(error) => Err(io_error("remove", &open)(error)),
         }
@@ -261,7 +270,8 @@ impl Printers {
             let Some(job) = name.strip_prefix(&prefix) else { continue };
             let path = self.folder.join(&name);
             if is_note(&path) && !is_closed(&path, &self.folder.join(closed(&name))) {
-                found.push(Unfinished { job: job.to_owned(), boot: self.boot(&name) });
+                let boot = fact(&path).and_then(|fact| fact.boot);
+                found.push(Unfinished { job: job.to_owned(), boot });
             }
         }
         Ok(found)
@@ -285,23 +295,12 @@ impl Printers {
                 }
                 Err(error) if error.kind() == io::ErrorKind::NotFound => {}
                 Err(error) if error.kind() == io::ErrorKind::PermissionDenied => {
-                    self.write(&self.folder.join(closed(name)), &Fact { boot: None, since: 0 })?;
+                    self.write(&self.folder.join(closed(name)), &fact(&path).unwrap_or_default())?;
                 }
                 Err(error) => return Err(io_error("remove", &path)(error)),
             }
         }
         self.sync()
-    }
-
-    fn boot(&self, name: &str) -> Option<u32> {
-        let path = self.folder.join(name);
-        // A link or a device in its place says nothing, which counts as the worst.
-        if !path.symlink_metadata().is_ok_and(|found| found.is_file()) {
-            return None;
-        }
-        let mut text = String::new();
-        File::open(path).ok()?.take(LARGEST).read_to_string(&mut text).ok()?;
-        serde_json::from_str::<Fact>(&text).ok()?.boot
     }
 
     fn names(&self) -> Result<Vec<String>, PrintersError> {
@@ -351,7 +350,17 @@ fn is_note(path: &Path) -> bool {
     path.symlink_metadata().is_ok_and(|found| found.is_file() || found.is_symlink())
 }
 
-/// Whether an open note is closed by somebody whose word counts.
+/// What a note says. A link or a device in its place says nothing, which counts as the worst.
+fn fact(path: &Path) -> Option<Fact> {
+    if !path.symlink_metadata().is_ok_and(|found| found.is_file()) {
+        return None;
+    }
+    let mut text = String::new();
+    File::open(path).ok()?.take(LARGEST).read_to_string(&mut text).ok()?;
+    serde_json::from_str(&text).ok()
+}
+
+/// Whether an open note is closed by somebody whose word counts, and this very note: a job that begins once more has another.
 fn is_closed(open: &Path, closed: &Path) -> bool {
     let Ok(found) = closed.symlink_metadata() else { return false };
     #[cfg(unix)]
@@ -363,7 +372,7 @@ fn is_closed(open: &Path, closed: &Path) -> bool {
     };
     #[cfg(not(unix))]
     let counts = open.symlink_metadata().is_ok();
-    found.is_file() && counts
+    found.is_file() && counts && fact(open).unwrap_or_default() == fact(closed).unwrap_or_default()
 }
 
 /// The name of the file that closes the one of this name.
@@ -385,7 +394,7 @@ fn shared_folder() -> Option<PathBuf> {
 /// Makes the folder all users share, for an administrator: everyone may add to it, and nobody remove what is another's.
 pub fn make_shared_folder() -> Result<(), PrintersError> {
     let Some(folder) = shared_folder() else { return Ok(()) };
-    durable::make_folder(&folder).map_err(io_error("make", &folder))?;
+    durable::make_folder(&folder, Access::Everyone).map_err(io_error("make", &folder))?;
     #[cfg(unix)]
     fs::set_permissions(&folder, std::os::unix::fs::PermissionsExt::from_mode(0o1777))
         .map_err(io_error("make", &folder))?;
@@ -435,8 +444,15 @@ mod tests {
         let printers = Printers::at(folder.path()).unwrap();
         let printer = Printer::Bridge(1);
         printers.begin(&printer, "0000000a", Some(5)).unwrap();
-        fs::write(folder.path().join("closed.bridge-0000000000000001.0000000a"), "{}").unwrap();
+        let [open, closed] = ["open", "closed"].map(|kind| printers.path(kind, &printer, "0000000a"));
+        fs::copy(open, closed).unwrap();
         assert_eq!(printers.unfinished(&printer).unwrap(), []);
+        // The same job has begun once more since, in another start of the bridge.
+        printers
+            .write(&printers.path("open", &printer, "0000000a"), &Fact { boot: Some(6), since: 1 })
+            .unwrap();
+        assert_eq!(printers.unfinished(&printer).unwrap().len(), 1);
+        printers.close(&printer, "0000000a").unwrap();
         printers.begin(&printer, "0000000b", Some(5)).unwrap();
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
         assert_eq!(printers.unfinished(&printer).unwrap().len(), 1);
@@ -450,8 +466,8 @@ mod tests {
         let printer = Printer::Bridge(1);
         fs::create_dir(folder.path().join("open.bridge-0000000000000001.0000000f")).unwrap();
         printers.begin(&printer, "0000000a", Some(5)).unwrap();
-        let closed = folder.path().join("closed.bridge-0000000000000001.0000000a");
-        fs::write(&closed, "{}").unwrap();
+        let [open, closed] = ["open", "closed"].map(|kind| printers.path(kind, &printer, "0000000a"));
+        fs::copy(open, &closed).unwrap();
         assert_eq!(printers.unfinished(&printer).unwrap(), []);
         // Where the test may choose whose a file is.
         if std::os::unix::fs::lchown(&closed, Some(65_534), None).is_ok() {

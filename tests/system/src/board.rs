@@ -114,8 +114,9 @@ impl Board {
         self.engine.into_memory()
     }
 
-    /// So many bytes cross the port; all are marked but the last `unmarked`.
+    /// So many bytes cross the port; all are marked but the last `unmarked`. What the driver does before the first of them is done.
     pub fn cross(&mut self, count: usize, unmarked: usize) {
+        self.checkpoints.store(self.engine.checkpoint(), self.checkpoints.place());
         for sent in 0..count.saturating_sub(unmarked) {
             self.checkpoints.mark(sent);
         }

@@ -23,12 +23,15 @@ use chance::{Chance, Key, Kind};
 use promises::{Broken, Promise};
 use std::cell::RefCell;
 use std::collections::BTreeSet;
-use std::time::Duration;
-use world::{Shared, USERS, World};
+use std::time::{Duration, Instant};
+use world::{Shared, World};
 
 /// Steps in which things go wrong, and then those in which all that is open has to end.
-const ROUGH: u64 = 6_000;
+pub(crate) const ROUGH: u64 = 6_000;
 const CALM: u64 = 60_000;
+
+/// For how long a script is made shorter.
+const SHRINKING: Duration = Duration::from_secs(30);
 
 thread_local! {
     static MEMORY: RefCell<Option<Memory<'static>>> = const { RefCell::new(None) };
@@ -75,12 +78,8 @@ pub fn run(seed: u64, script: Option<BTreeSet<Key>>) -> Run {
 
 /// All is well again, and what is open has to end.
 fn settle(world: &Shared) {
-    world.look().calm();
     let last = world.look().step + CALM;
-    for user in 0..USERS {
-        world.look().release();
-        users::finish(world, user);
-    }
+    users::finish(world);
     while world.look().is_busy() {
         world.step(Duration::from_millis(20));
         if world.look().step > last {
@@ -90,7 +89,7 @@ fn settle(world: &Shared) {
     }
 }
 
-/// The shortest part of what has happened that still breaks the same promise; some hundred runs at most.
+/// The shortest part of what has happened that still breaks the same promise; some hundred runs, or half a minute, at most.
 pub fn shrink(seed: u64, found: &Run) -> Vec<Key> {
     let Some(broken) = &found.broken else { return Vec::new() };
     let breaks = |keys: &[Key]| {
@@ -99,10 +98,10 @@ pub fn shrink(seed: u64, found: &Run) -> Vec<Key> {
     };
     let mut keys = found.happened.clone();
     let mut piece = keys.len().div_ceil(2);
-    let mut runs = 0;
-    while piece > 0 && runs < 400 {
+    let (mut runs, start) = (0, Instant::now());
+    while piece > 0 {
         let mut at = 0;
-        while at < keys.len() && runs < 400 {
+        while at < keys.len() && runs < 400 && start.elapsed() < SHRINKING {
             let mut fewer = keys.clone();
             fewer.drain(at..(at + piece).min(keys.len()));
             runs += 1;
@@ -120,9 +119,14 @@ pub fn shrink(seed: u64, found: &Run) -> Vec<Key> {
 /// A broken seed in words: the promise, what was found, and the shortest script.
 pub fn report(seed: u64, found: &Run) -> String {
     let Some(broken) = &found.broken else { return String::new() };
+    let keys = shrink(seed, found);
     let script: String =
-        shrink(seed, found).iter().map(|key| format!("    step {:>6}: {:?}\n", key.step, key.kind)).collect();
-    format!("seed {seed}: {broken:?}\n  of {} occasions these are enough:\n{script}", found.happened.len())
+        keys.iter().map(|key| format!("    step {:>6}: {:?}\n", key.step, key.kind)).collect();
+    let shorter = run(seed, Some(keys.into_iter().collect())).broken;
+    format!(
+        "seed {seed}: {broken:?}\n  of {} occasions these are enough:\n{script}  for {shorter:?}",
+        found.happened.len()
+    )
 }
 
 /// How often each kind has happened.

@@ -18,7 +18,7 @@ use device::transit::finish::Sheet;
 use device::transit::journal::{Journal, fresh_number};
 use device::transit::session::{Outcome, Phase};
 use observe::{Observer, Silent};
-use protocol::link::message::JobState;
+use protocol::link::message::{JobState, Progress};
 use std::cell::{Cell, RefCell};
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -68,8 +68,10 @@ fn become_user(user: Option<usize>) {
 pub fn give_to_stranger(path: &Path) {
     #[cfg(target_os = "linux")]
     if can_be_others() {
+        let before = rustix::process::geteuid().as_raw();
         become_user(None);
         std::os::unix::fs::lchown(path, Some(NUMBERS[USERS]), None).expect("root may");
+        become_user(NUMBERS.iter().position(|&number| number == before));
     }
     let _ = path;
 }
@@ -132,7 +134,7 @@ impl Caller for Person<'_> {
     fn waits(&self, _obstacle: &Failure, _begun: bool) -> bool {
         self.waited.set(self.waited.get() + 1);
         self.world.pause(self.user, Duration::from_secs(1));
-        self.waited.get() < if self.calm { 200 } else { 10 }
+        self.waited.get() < if self.calm { 30 } else { 10 }
     }
 
     fn wish(&self) -> Wish {
@@ -178,20 +180,24 @@ pub fn run(world: &Shared, user: usize, mut draw: Draw) {
     });
 }
 
-/// When all is well again, this user goes on until none of his jobs is open.
-pub fn finish(world: &Shared, user: usize) {
+/// When all is well again, the users go on by turns until none of their jobs is open: one may wait for another's.
+pub fn finish(world: &Shared) {
     for _ in 0..40 {
         let mut open = false;
-        process(world, user, Draw::new(1), true, |person, desk| {
-            open = desk.unfinished(person).is_some();
-            desk.resume(person, false);
-        });
+        for user in 0..USERS {
+            process(world, user, Draw::new(1), true, |person, desk| {
+                desk.end_orphan(person);
+                open |= desk.unfinished(person).is_some();
+                desk.resume(person, false);
+            });
+        }
         if !open {
             return;
         }
     }
     let mut world = world.look();
-    world.fail(Promise::EveryJobEnds, format!("user {user} has resumed 40 times"));
+    let found = format!("the users have resumed 40 times; {}; {}", world.last_failure, world.standing());
+    world.fail(Promise::EveryJobEnds, found);
 }
 
 /// A process of a user from its beginning to its end.
@@ -256,12 +262,23 @@ impl Desk<'_> {
             .filter(|entry| !matches!(entry.record.phase, Phase::Ended(_)))
             .map(|entry| entry.record.job)
             .collect();
-        open.into_iter().min_by_key(|number| world.known.get(number).map(|known| known.order))
+        // The one that the bridge has open goes first: it takes no other.
+        let at_bridge = world.open_job();
+        let order =
+            |number: &u32| (at_bridge != Some(*number), world.known.get(number).map(|known| known.order));
+        open.into_iter().min_by_key(order)
     }
 
     fn resume(&self, person: &Person<'_>, cancel: bool) {
         let Some(number) = self.unfinished(person) else { return };
-        let Ok(job) = self.journal.open(number) else { return };
+        let job = match self.journal.open(number) {
+            Ok(job) => job,
+            Err(error) => {
+                let said = format!("user {}: {}", person.user, observe::with_causes(&error));
+                person.world.look().last_failure = said;
+                return;
+            }
+        };
         person.number.set(Some(number));
         {
             let mut world = person.world.look();
@@ -271,6 +288,10 @@ impl Desk<'_> {
         }
         let delivery = Delivery::new(self.printers, person);
         let sent = delivery.send(self.journal, job, &address(), None, cancel);
+        if let Err(failure) = &sent {
+            person.world.look().last_failure =
+                format!("user {}: {}", person.user, observe::with_causes(failure));
+        }
         self.judge(person, &delivery, sent.ok().map(|ended| ended.outcome));
     }
 
@@ -279,11 +300,12 @@ impl Desk<'_> {
         let (Some(number), Some(outcome)) = (person.number.get(), outcome) else { return };
         told(person.world, number, outcome);
         if outcome == Outcome::Printed && person.said.borrow_mut().one_in_1000(300) {
-            let sheet = delivery.await_sheet(&address(), &mut |_| {});
+            let sheet = delivery.await_sheet(number, &address(), &mut |_| {});
             let mut world = person.world.look();
-            let now = world.now;
-            if sheet == Sheet::Out && !world.printer.is_out(now) {
-                world.fail(Promise::OutIsOut, format!("job {number:08x} is said to be out"));
+            let (now, out_at) = (world.now, world.known.get(&number).map(|known| known.out_at));
+            if sheet == Sheet::Out && out_at > Some(now) {
+                let found = format!("job {number:08x} is said to be out at {now}, and is at {out_at:?}");
+                world.fail(Promise::OutIsOut, found);
             }
         }
     }
@@ -316,6 +338,16 @@ impl Desk<'_> {
             _ => return,
         };
         told(person.world, number, outcome);
+    }
+
+    /// `foilpress cancel --to`: what is half stored, and whose sender was killed, is given up.
+    fn end_orphan(&self, person: &Person<'_>) {
+        let Ok(mut link) = person.open(&address(), None) else { return };
+        let Ok(mut query) = Query::new(&mut *link, BRIDGE) else { return };
+        let Progress { job, state, .. } = *query.progress();
+        if state == JobState::Storing {
+            let _ = query.cancel(job, BRIDGE);
+        }
     }
 
     fn delete_stored(&self, person: &Person<'_>) {

@@ -4,6 +4,7 @@
 //! Processes of users run inside it: whoever waits for the link lets steps pass, and in one of them the other user may begin and end
 //! something (`users`).
 
+use crate::ROUGH;
 use crate::board::{Board, Retained};
 use crate::chance::{Chance, Draw, Kind};
 use crate::pool::{self, Prepared};
@@ -32,6 +33,8 @@ const WAYS: [Way; USERS] = [Way::Serial, Way::Bulk];
 /// Sectors of the flash.
 const SECTORS: usize = 24;
 const MS: u64 = 1000;
+/// What is not over by then never is.
+const LAST_STEP: u64 = 2_000_000;
 
 /// A job as it was meant.
 #[derive(Clone, Copy, Debug)]
@@ -48,6 +51,8 @@ pub struct Known {
     pub begun: u32,
     /// Of them, those that came whole.
     pub whole: u32,
+    /// When the last one is out of the printer.
+    pub out_at: u64,
     /// It was asked to end early.
     pub cancelled: bool,
 }
@@ -99,6 +104,8 @@ pub struct World {
     pub notes: PathBuf,
     /// What of the pool was sent already.
     pub used: usize,
+    /// Why the last job that was resumed did not end.
+    pub last_failure: String,
     /// Something happened that may cost a sheet.
     pub harmed: bool,
     seed: u64,
@@ -143,6 +150,7 @@ impl World {
             doomed: [false; USERS],
             notes,
             used: draw.below(pool::SIZE),
+            last_failure: String::new(),
             harmed: false,
             seed,
             board: None,
@@ -183,7 +191,7 @@ impl World {
     /// A user sends this job under this number.
     pub fn meet(&mut self, number: u32, which: usize, user: usize, stored: bool) {
         let order = self.known.len();
-        let known = Known { order, which, user, stored, begun: 0, whole: 0, cancelled: false };
+        let known = Known { order, which, user, stored, begun: 0, whole: 0, out_at: 0, cancelled: false };
         self.known.entry(number).or_insert(known);
     }
 
@@ -239,6 +247,16 @@ impl World {
     /// A step of at most this long.
     fn turn(&mut self, most: u64) -> Todo {
         self.step += 1;
+        if self.step >= ROUGH {
+            self.calm();
+            self.release();
+        }
+        if self.step == LAST_STEP {
+            self.fail(Promise::EveryJobEnds, format!("somebody still waits; {}", self.standing()));
+        }
+        if self.step >= LAST_STEP {
+            self.doomed = self.runs;
+        }
         self.chance.begin(self.step);
         let busy = !self.to_board.is_empty()
             || self.plain.is_some()
@@ -278,7 +296,10 @@ impl World {
         if let Some(mut draw) = self.chance.happens(Kind::PaperOut) {
             self.printer.paper_out_until = self.now + draw.below(4_000) as u64 * MS;
         }
-        if let Some(mut draw) = self.chance.happens(Kind::SwitchOff) {
+        // A printer that is off only while the board restarts is one that nobody has seen off.
+        if self.board.is_some()
+            && let Some(mut draw) = self.chance.happens(Kind::SwitchOff)
+        {
             self.harmed = true;
             self.printer.off_until = self.now + (50 + draw.below(4_000) as u64) * MS;
             self.printer.reset();
@@ -330,7 +351,7 @@ impl World {
         for name in listing.filter_map(|item| item.ok()?.file_name().into_string().ok()) {
             if let Some(rest) = name.strip_prefix("open.") {
                 let path = self.notes.join(format!("closed.{rest}"));
-                if std::fs::write(&path, "{\"boot\":null,\"since\":0}").is_ok() {
+                if std::fs::copy(self.notes.join(&name), &path).is_ok() {
                     crate::users::give_to_stranger(&path);
                 }
             }
@@ -547,7 +568,7 @@ impl World {
                     | JobState::Storing
             )
         };
-        if !ends(&after) || (before.job, before.state) == (after.job, after.state) || after.job == 0 {
+        if !ends(&after) || before == after || after.job == 0 {
             return;
         }
         let number = after.job;
@@ -586,15 +607,20 @@ impl World {
             _ => {}
         }
         if part && is_a_whole_job(&self.printer.since) {
-            self.printer.whole(self.now);
+            let out_at = self.printer.whole(self.now);
             if after.state == JobState::Done
                 && let Some(known) = self.known.get_mut(&number)
             {
                 known.whole += 1;
+                known.out_at = out_at;
             }
         }
-        if number == LOCAL {
+        if number == LOCAL && after.state != JobState::Done {
+            // Whoever prints sees that, takes the rest back and resets the interface.
             self.plain = None;
+            if let Some(board) = &mut self.board {
+                board.intake.end(End::Reset, &mut board.engine, self.now);
+            }
         }
     }
 
@@ -602,6 +628,23 @@ impl World {
     pub fn calm(&mut self) {
         self.chance.calm();
         (self.printer.off_until, self.printer.paper_out_until, self.pulled_until) = (0, 0, 0);
+    }
+
+    /// The job that the bridge has open.
+    pub fn open_job(&self) -> Option<u32> {
+        self.board.as_ref()?.engine.open_job()
+    }
+
+    /// Where the board stands, and what is known of its job.
+    pub fn standing(&self) -> String {
+        let progress = self.board.as_ref().map(|board| board.engine.progress());
+        let notes = std::fs::read_dir(&self.notes).into_iter().flatten().filter_map(|item| {
+            let path = item.ok()?.path();
+            Some((path.file_name()?.to_owned(), std::fs::read_to_string(path).ok()?))
+        });
+        let notes: Vec<_> = notes.collect();
+        let job = progress.and_then(|progress| self.known.get(&progress.job));
+        format!("{progress:?} of {job:?}, start {}, notes {notes:?}", self.starts)
     }
 
     /// Whether the board is busy with something that ends by itself.

@@ -215,7 +215,9 @@ impl Failure {
     /// Whether it may pass by itself: what is away may come back, and what is in use is free again one day.
     pub fn may_pass(&self) -> bool {
         match self {
-            Failure::Open(error) => !matches!(error, OpenError::Forbidden(_) | OpenError::Several(_)),
+            Failure::Open(error) => {
+                !matches!(error, OpenError::Forbidden(_) | OpenError::Several(_) | OpenError::Twins(_))
+            }
             Failure::Query(error) | Failure::Ask(AskError::Query(error)) => {
                 matches!(error, QueryError::Link(_) | QueryError::NoAnswer | QueryError::JobOpen(_))
             }
@@ -358,9 +360,9 @@ pub struct Delivery<'a> {
 }
 
 impl<'a> Delivery<'a> {
-    /// A way for this caller. If what is known of printers is not shared with other users, the caller is told.
+    /// A way for this caller. If what is known of printers is not shared with other users, or cannot be what it is, the caller is told.
     pub fn new(printers: &'a Printers, caller: &'a dyn Caller) -> Delivery<'a> {
-        if let Some(note) = printers.note() {
+        for note in printers.notes() {
             caller.tell(&News::Note(&note));
         }
         Delivery { printers, ledger: Ledger::in_folder(printers.folder()), caller }

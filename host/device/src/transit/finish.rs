@@ -3,8 +3,10 @@
 //! Problem: a job is done when the sheet is out, but what the bridge knows is that the last byte has crossed the port;
 //! the printer holds some of it and prints for a while. Method: ask for its status every few seconds, as the vendor's
 //! own monitor does. Its answer lags: an MD-5000 says idle right behind the last byte and then prints for half a minute. So
-//! the sheet is out when the printer was seen printing and has ended, or has been idle for 20 s.
+//! the sheet is out when the printer was seen at work and has ended, or has been idle for 20 s. Another job that comes meanwhile
+//! makes the answer that one's, and then nothing is known.
 //! Limits: a port that does not talk back tells nothing, and that is what is reported; the sheet itself nobody but the user can see.
+//! A printer that is switched off and on between two questions has lost the sheet and says that it is idle.
 
 use std::time::Duration;
 
@@ -52,9 +54,10 @@ fn unknown(why: &str) -> Sheet {
     Sheet::Unknown(why.into())
 }
 
-/// Waits, without limit, until the printer says that it is done, asking every few seconds. `watch` is told what is the
+/// Waits, without limit, until the printer says that it is done with this job, asking every few seconds. `watch` is told what is the
 /// matter with the printer, once for each change; nothing when all is well again.
 pub(crate) fn await_sheet(
+    job: u32,
     open: &mut dyn FnMut() -> Result<Box<dyn Transport>, OpenError>,
     pause: &mut dyn FnMut(Duration),
     watch: &mut dyn FnMut(&[String]),
@@ -62,7 +65,7 @@ pub(crate) fn await_sheet(
     let mut link = open()?;
     let mut query = Query::new(&mut *link, BRIDGE_PATIENCE)?;
     let mut troubles: Vec<String> = Vec::new();
-    let (mut printed, mut idle, mut unanswered, mut most) = (false, 0, 0, NEVER);
+    let (mut worked, mut idle, mut unanswered, mut most) = (false, 0, 0, NEVER);
     loop {
         let (busy, said) = match query.printer(Ask::Printer, PRINTER_PATIENCE)? {
             Reply::OneWay => return Ok(unknown("the printer's port is one-way")),
@@ -77,8 +80,9 @@ pub(crate) fn await_sheet(
             Reply::Stopped(fault) => (None, vec![super::words::fault(fault, None)]),
             Reply::Bytes(bytes) => match Status::read(&bytes) {
                 Ok(status) => {
-                    printed |= status.printing;
-                    (Some(status.printing || status.holds_data || status.stale), status.errors)
+                    let works = status.printing || status.holds_data;
+                    worked |= works;
+                    (Some(works || status.stale), status.errors)
                 }
                 Err(_) => (None, Vec::new()),
             },
@@ -95,8 +99,14 @@ pub(crate) fn await_sheet(
             watch(&said);
             troubles = said;
         }
-        if idle >= if printed { 1 } else { STILL_IDLE } {
-            return Ok(Sheet::Out);
+        if idle >= if worked { 1 } else { STILL_IDLE } {
+            // Asked behind the last answer: a job that came after it changes nothing.
+            let last = query.ask_progress(BRIDGE_PATIENCE)?;
+            return Ok(if last.job == job {
+                Sheet::Out
+            } else {
+                unknown("the bridge has had another job since")
+            });
         }
         if unanswered == most {
             return Ok(unknown("the printer does not answer"));
