@@ -44,7 +44,7 @@ impl Delivery<'_> {
         let (taken, whole) = match &sent {
             Ok(sent) => (sent.taken, sent.whole),
             Err(RawError::Write { taken, .. }) => (*taken, false),
-            Err(RawError::Open { .. }) => (0, false),
+            Err(RawError::Open { .. } | RawError::NoDevice { .. }) => (0, false),
         };
         self.counted(&number, taken as u64, whole);
         if sent.is_ok() || taken == 0 {
