@@ -9,6 +9,7 @@
 //! supply is known from the flash, and after any other reset from memory, to the byte ([`crate::checkpoint`]); then the
 //! engine gets the data once more and leaves out what has crossed.
 //! Cost: a poll that writes takes as long as the flash does; all others stay well below a millisecond.
+//! That a plain job is open is written, too, since neither a host nor the store knows of it.
 //! Limits: if the supply goes between the last byte of a job and the note that it has ended, some milliseconds, the sheet counts as lost.
 
 use crate::engine::{Engine, Request};
@@ -77,7 +78,7 @@ impl<F: Flash> Alone<F> {
         let Note { job, stored, .. } = self.store.note();
         let note = match &self.run {
             Some(run) => Note { standing: Standing::Printing, job: run.job, stored: run.stored.id() },
-            None if engine.owes_reset() => Note { standing: Standing::ResetOwed, job, stored },
+            None if engine.leaves_a_reset() => Note { standing: Standing::ResetOwed, job, stored },
             None => Note { standing: Standing::Clear, job, stored },
         };
         self.store.write_note(note);

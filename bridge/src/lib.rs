@@ -16,6 +16,7 @@
 //! | [`log`] | which piece of the log answers a question |
 //! | [`printer_class`] | the ordinary printer that operating systems see |
 //! | [`lamp`] | what the lamp shows |
+//! | [`deaf`] | when a USB controller that hears nothing makes the board restart |
 //!
 //! A board adds pins, an area of [flash](store::Flash), a [sender](driver::Sender), a clock, packets, memory that survives a reset, and the calls between these.
 //! `bridge/firmware` is one. `no_std`, no allocation, no `unsafe`. A conversion with `as` loses no bits, or the place says why.
@@ -29,6 +30,7 @@ extern crate std;
 pub mod alone;
 pub mod button;
 pub mod checkpoint;
+pub mod deaf;
 pub mod driver;
 pub mod engine;
 pub mod lamp;

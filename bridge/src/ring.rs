@@ -17,6 +17,11 @@ impl<'m> Ring<'m> {
         Ring { memory, start: 0, length: 0 }
     }
 
+    #[cfg(any(test, feature = "simulation"))]
+    pub(crate) fn into_memory(self) -> &'m mut [u8] {
+        self.memory
+    }
+
     pub(crate) fn capacity(&self) -> usize {
         self.memory.len()
     }

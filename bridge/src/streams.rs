@@ -74,6 +74,11 @@ impl<'m> Streams<'m> {
         }
     }
 
+    #[cfg(any(test, feature = "simulation"))]
+    pub(crate) fn into_memory(self) -> (&'m mut [u8], &'m mut Decoder) {
+        (self.band, self.decoder)
+    }
+
     /// Forgets everything: the next byte is that of a header.
     pub(crate) fn restart(&mut self) {
         self.writer = None;

@@ -102,3 +102,21 @@ test('ten cuts of the supply while the image stores and prints cost nothing but 
   }
   assert.ok(lost === 5 && stored.length > 1 && stored.length < 6, `${lost} ${stored}`);
 });
+
+test('a flash that never ends an operation costs the store until the supply was away, and nothing else', { skip }, async () => {
+  let bench = new Bench();
+  await bench.connect('bulk');
+  const bytes = job('small.rgl');
+  bench.board.flashHangs = true;
+  await assert.rejects(bench.store(5, RAW, bytes, 'leaf', 500));
+  bench = bench.restarted();
+  // If it were begun again it would hang again.
+  bench.board.flashHangs = true;
+  await bench.connect('bulk');
+  assert.equal((await bench.stored()).total, 0);
+  assert.equal((await bench.print(6, RAW, bytes)).state, 'done');
+  same(bench.printer.taken, bytes);
+  bench = bench.restarted(false);
+  await bench.connect('bulk');
+  assert.ok((await bench.stored()).total > 1_000_000);
+});

@@ -43,6 +43,13 @@ export const legal = (printer, least = STANDARD) => {
   return shortest;
 };
 
+/// What an image may take and do.
+export function budgets(image) {
+  const text = readFileSync(new URL('../../xtask/budgets.toml', import.meta.url), 'utf8');
+  const [, section] = text.split(`[${image}]`);
+  return Object.fromEntries([...section.split('\n[')[0].matchAll(/^(\w+) = (\d+)/gm)].map(([, key, value]) => [key, Number(value)]));
+}
+
 export const job = (name) => new Uint8Array(readFileSync(join(jobs, name)));
 
 export class Bench {
@@ -67,10 +74,13 @@ export class Bench {
   }
 
   /// What the watchdog does: the board begins anew, with its memory as it was. The printer notices nothing. With `memory` false,
-  /// what the loss of the supply does.
-  restarted(memory = true) {
+  /// what the loss of the supply does; with `reason` 0, what RUN does.
+  restarted(memory = true, reason = 1) {
     const next = new this.constructor(this.settings);
-    if (memory) next.board.chip.sram.set(this.board.chip.sram);
+    if (memory) {
+      next.board.chip.sram.set(this.board.chip.sram);
+      next.board.chip.peripherals[0x40058].reason = reason;
+    }
     next.printer.taken = this.printer.taken;
     next.board.chip.flash.set(this.board.chip.flash);
     return next;

@@ -73,7 +73,7 @@ function reach(bench, all, name) {
 function reachLog(bench, all) {
   // The printer goes, which is logged.
   bench.printer.later(0, () => bench.printer.change({ paperOut: 1 }));
-  reach(bench, all, '8retained3log');
+  reach(bench, all, '8retained3log17h');
   bench.printer.own.paperOut = 0;
 }
 

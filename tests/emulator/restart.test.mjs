@@ -55,6 +55,23 @@ test('restarts again and again, wherever they come but in the microsecond of a s
   same(bench.printer.taken, expected);
 });
 
+test('RUN pressed while bytes flow loses the job and says so; while none flow it costs nothing', { skip }, async () => {
+  const expected = job('small.rgl');
+  let bench = new Bench({ work: 12_000 });
+  await bench.connect('bulk');
+  // The host is slow: all whole commands that it has sent have crossed.
+  await bench.print(3, RAW, expected, { until: (sent) => sent >= 1800 });
+  await bench.pass(500);
+  bench = bench.restarted(true, 0);
+  assert.equal((await standing(bench, 3)).state, 'printing');
+  await bench.print(3, RAW, expected, { until: () => bench.printer.taken.length >= 4000 });
+  const { resets } = bench.printer;
+  bench = bench.restarted(true, 0);
+  assert.equal((await standing(bench, 3)).state, 'lost');
+  await bench.pass(50);
+  assert.equal(bench.printer.resets, resets + 1);
+});
+
 test('bytes that the processor sent itself are known too', { skip }, async () => {
   const expected = job('small.rgl');
   let bench = new Bench({ work: 20_000 });

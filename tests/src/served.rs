@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use bridge::alone::Alone;
 use bridge::button::Press;
@@ -18,6 +18,12 @@ use protocol::ink::Ink;
 use protocol::link::frame::{MAX, Reader};
 use protocol::link::message::{Answer, Fault, Lines, Usage};
 use protocol::runs::Decoder;
+
+/// How long the printer prints behind the last byte.
+const PRINTS: Duration = Duration::from_secs(1);
+
+/// The bits of the status byte that say so.
+const PRINTING: u8 = 0x09;
 
 /// What a test sees of the printer and does to it and the bridge.
 pub struct Port {
@@ -37,6 +43,10 @@ pub struct Port {
     pub maker: Mutex<Option<&'static str>>,
     /// The printer does not say how it is.
     pub one_way: AtomicBool,
+    /// For so many milliseconds behind the last byte the printer says idle, and then for a second that it prints.
+    pub lag: AtomicUsize,
+    /// When the last byte came.
+    last: Mutex<Option<Instant>>,
     /// How often the printer was asked how it is.
     pub asked: AtomicUsize,
     /// How often the printer was reset.
@@ -74,6 +84,8 @@ impl Port {
             open_cover: false.into(),
             maker: Mutex::default(),
             one_way: false.into(),
+            lag: 0.into(),
+            last: Mutex::default(),
             asked: 0.into(),
             resets: 0.into(),
             reset_at: Mutex::default(),
@@ -100,7 +112,13 @@ impl Port {
         if is(&self.open_cover) {
             printer.strike(Trouble::CoverOpen);
         }
-        printer.status()
+        let mut status = printer.status();
+        let last = *self.last.lock().expect("no test panicked with it");
+        let from = Duration::from_millis(self.lag.load(Ordering::Relaxed) as u64);
+        if last.is_some_and(|last| (from..from + PRINTS).contains(&last.elapsed())) {
+            status[4] |= PRINTING;
+        }
+        status
     }
 }
 
@@ -290,6 +308,9 @@ fn serve(
         let count = if waits { 0 } else { bytes.len().min(port.rate.load(Ordering::Relaxed)) };
         printed.extend_from_slice(&bytes[..count]);
         drop(printed);
+        if count > 0 {
+            *port.last.lock().expect("no test panicked with it") = Some(Instant::now());
+        }
         engine.consumed(count);
         if engine.usage_wanted() {
             engine.usage(Usage { fixed: 100_000, stack: 32_768, stack_used: 2_000, longest_us: 300 });

@@ -71,11 +71,15 @@ const RIG: Board = Board {
 /// What the compiler makes code for; `rustup target add` brings them.
 pub const BARE_METAL: [&str; 2] = [BOARDS[0].target, BOARDS[1].target];
 
-/// Flash and static memory an image may take.
+/// What an image may take, by `xtask/budgets.toml`.
 struct Budget {
     flash: usize,
     memory: usize,
+    stack: usize,
 }
+
+/// What the boot ROM keeps of the memory.
+const ROM: usize = 8 << 10;
 
 /// The compiler with clippy's lints.
 const CLIPPY: &str = "clippy-driver";
@@ -140,15 +144,15 @@ fn build_for(board: &Board, root: &Path) -> Result<PathBuf> {
     let elf = path.with_extension("elf");
     fs::write(&elf, &bytes).with_context(|| format!("{} cannot be written", elf.display()))?;
 
-    let budget = budget(&folder.join("budget.toml"))?;
+    let budget = budget(&root.join("xtask/budgets.toml"), board.name)?;
     println!("flash   {flash:>7} of {:>7} bytes", budget.flash);
     println!(
         "memory  {memory:>7} of {:>7} bytes, static; the {} has {}",
         budget.memory, board.chip, board.memory
     );
     println!("{} ({} pages)", path.display(), read.pages().len());
-    if flash > budget.flash || memory > budget.memory {
-        bail!("the image is larger than {}/budget.toml allows", board.folder);
+    if flash > budget.flash || memory > budget.memory || memory + budget.stack + ROM > board.memory {
+        bail!("the image of {} is larger than xtask/budgets.toml allows", board.folder);
     }
     Ok(path)
 }
@@ -176,14 +180,17 @@ pub fn workspace_target(root: &Path) -> PathBuf {
     env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from)
 }
 
-fn budget(path: &Path) -> Result<Budget> {
+fn budget(path: &Path, image: &str) -> Result<Budget> {
     let text = fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
+    let section = text.split("\n[").find_map(|section| section.strip_prefix(image)?.strip_prefix("]\n"));
+    let section = section.with_context(|| format!("{}: `[{image}]` is missing", path.display()))?;
     let number = |key: &str| {
-        text.lines()
+        section
+            .lines()
             .filter_map(|line| line.split('#').next()?.split_once('='))
             .find(|(name, _)| name.trim() == key)
             .and_then(|(_, value)| value.trim().parse().ok())
             .with_context(|| format!("{}: `{key}` is missing or no number of bytes", path.display()))
     };
-    Ok(Budget { flash: number("flash")?, memory: number("memory")? })
+    Ok(Budget { flash: number("flash")?, memory: number("memory")?, stack: number("stack")? })
 }

@@ -31,13 +31,13 @@ struct Args {
 enum Task {
     /// Run everything that has to pass: format, lints, documents, all tests, emulator, print queues, package
     Test {
-        /// Run the commands of documents and help as they stand, and sixteen times as many cases of each property: about an hour
+        /// Run the commands of documents and help as they stand, and sixteen times as many cases of each property, and the whole system under one seed after another: some three hours
         #[arg(long)]
         full: bool,
     },
     /// Run the benchmarks
     Bench,
-    /// Build the bridge's firmware as UF2 and check its size against bridge/firmware/budget.toml
+    /// Build the bridge's firmware as UF2 and check its size against xtask/budgets.toml
     Firmware,
     /// Test the firmware's image on an emulated board
     Emulator {

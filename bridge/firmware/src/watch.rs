@@ -5,14 +5,18 @@
 //! either hangs, or another one keeps the processor, the board restarts after eight seconds. During the reset a resistor
 //! holds nOE high, so the printer sees nothing of it. The library decides what the lamp shows
 //! ([`bridge::lamp`]) and what a press of the button means ([`bridge::button`]).
+//!
+//! A USB controller that hears nothing any more ([`bridge::deaf`]) restarts the board, with no byte cut in two; the job goes on
+//! after it.
 
-use crate::pins;
 use crate::shared::{Shared, Side};
+use crate::{pins, strobe};
 use bridge::button::Button;
+use bridge::deaf::{Deaf, LOOK_MS, Shown};
 use bridge::lamp::{self, Lamp};
-use embassy_rp::Peri;
 use embassy_rp::peripherals::WATCHDOG;
 use embassy_rp::watchdog::Watchdog;
+use embassy_rp::{Peri, pac};
 use embassy_time::{Duration, Instant, Timer};
 use portable_atomic::{AtomicBool, Ordering};
 
@@ -27,9 +31,6 @@ pub enum Life {
 
 /// They have, since the watchdog was last fed.
 static ALIVE: [AtomicBool; 2] = [const { AtomicBool::new(false) }; 2];
-
-/// Between two looks at the button: a tap takes some 60 ms.
-const LOOK_MS: u32 = 10;
 
 const PATIENCE: Duration = Duration::from_secs(8);
 
@@ -48,7 +49,7 @@ pub fn start(watchdog: Peri<'static, WATCHDOG>) -> Watchdog {
 /// Runs all three.
 #[embassy_executor::task]
 pub async fn run(shared: &'static Shared, mut watchdog: Watchdog) -> ! {
-    let (mut lamp, mut button) = (Lamp::new(), Button::new());
+    let (mut lamp, mut button, mut deaf) = (Lamp::new(), Button::new(), Deaf::new());
     loop {
         pins::lamp(shared.engine(|engine| lamp.next(engine)));
         if ALIVE.iter().all(|alive| alive.load(Ordering::Relaxed)) {
@@ -61,6 +62,18 @@ pub async fn run(shared: &'static Shared, mut watchdog: Watchdog) -> ! {
                 shared.engine(|engine| engine.press(press));
                 shared.wake(Side::Store);
                 shared.wake(Side::Port);
+            }
+            let shown = Shown {
+                reset: pac::USB.sie_status().read().bus_reset(),
+                address: pac::USB.addr_endp().read().address(),
+                frame: pac::USB.sof_rd().read().count(),
+            };
+            if deaf.look(shown) {
+                defmt::warn!("USB hears nothing: the board restarts");
+                cortex_m::interrupt::disable();
+                strobe::halt();
+                pins::enable(false);
+                watchdog.trigger_reset();
             }
             Timer::after(Duration::from_millis(LOOK_MS.into())).await;
         }

@@ -162,6 +162,10 @@ where
         if self.owner == Owner::WiringTest && !engine.output().is_empty() {
             self.release_pins();
         }
+        if self.board.in_flight() == 0 && !engine.output().is_empty() {
+            // That bytes flow is kept before the first of them does.
+            self.keep(engine);
+        }
         let pause_us = match self.owner {
             _ if self.talk.is_some() => BUSY_US,
             Owner::Sender => self.feed(engine),

@@ -146,8 +146,7 @@ impl Engine<'_> {
         if self.job.is_some() || !self.open(job, kind, length, Way::FromStore) {
             return false;
         }
-        self.owes_reset |= !self.at_rest;
-        self.reset_if_owed();
+        self.reset_unless_at_rest();
         true
     }
 
@@ -182,13 +181,19 @@ impl Engine<'_> {
     /// The store has lost the rest of the job. It ends early, as one whose data are not complete.
     pub fn end_from_store(&mut self) {
         if let Some(job) = self.job.as_mut().filter(|job| job.way == Way::FromStore) {
-            job.length = job.accepted;
+            (job.length, job.cut) = (job.accepted, true);
         }
     }
 
     /// The job that is open, whatever its way.
     pub fn open_job(&self) -> Option<u32> {
         self.job.as_ref().map(|job| job.id)
+    }
+
+    /// Whether the printer would have to be reset if the bridge lost its memory now: it must be already, or a job is open of which
+    /// neither a host nor the store knows.
+    pub fn leaves_a_reset(&self) -> bool {
+        self.owes_reset || self.job.as_ref().is_some_and(|job| job.id == LOCAL)
     }
 
     /// Whether the printer has to be reset before anything else goes to it.

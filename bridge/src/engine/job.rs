@@ -53,6 +53,8 @@ pub(super) struct Job {
     pub(super) made: u32,
     /// Bytes that have crossed the port.
     pub(super) printed: u32,
+    /// The store has lost the rest of it.
+    pub(super) cut: bool,
     pub(super) phase: Phase,
     pub(super) cancel: Cancel,
     /// For raw jobs: the accepted data are whole commands up to here.
@@ -75,6 +77,7 @@ impl Job {
             used: 0,
             made: 0,
             printed: 0,
+            cut: false,
             phase: Phase::Running,
             cancel: Cancel::None,
             settled: 0,

@@ -74,7 +74,13 @@ impl Engine<'_> {
                     self.end(JobState::Lost);
                     self.owes_reset = true;
                 }
-                self.between_jobs(Task::Initialise);
+                // One of which nothing has been made for the port yet is printed behind the reset.
+                let untouched = |job: &Job| job.printed == 0 && self.output.is_empty();
+                if self.job.as_ref().is_some_and(untouched) {
+                    self.unless_busy(Task::Initialise);
+                } else {
+                    self.between_jobs(Task::Initialise);
+                }
             }
             ToBridge::Bootloader => self.between_jobs(Task::Bootloader),
             ToBridge::Drive { data, control } => self.between_jobs(Task::Drive { data, control }),
@@ -145,10 +151,17 @@ impl Engine<'_> {
     /// Returns the number of bytes taken. The rest must be offered again, which on USB is a NAK. The engine takes nothing
     /// while a job of the link is open or the end of the last one has not crossed the port.
     ///
-    /// A job ends with the reset after its rows, or else with [`Engine::local_end`].
+    /// A job ends with the reset after its rows, or else with [`Engine::local_end`]. A printer of which nobody knows whether it
+    /// stands between two jobs is reset before the first byte.
     pub fn local(&mut self, bytes: &[u8]) -> usize {
-        if bytes.is_empty() || self.job.is_none() && !self.open(LOCAL, JobKind::Raw, u32::MAX, Way::ToPort) {
+        if bytes.is_empty() {
             return 0;
+        }
+        if self.job.is_none() {
+            if !self.open(LOCAL, JobKind::Raw, u32::MAX, Way::ToPort) {
+                return 0;
+            }
+            self.reset_unless_at_rest();
         }
         let Some(job) = &mut self.job else { return 0 };
         if job.id != LOCAL || job.phase != Phase::Running || job.length != u32::MAX {

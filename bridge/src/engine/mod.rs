@@ -131,8 +131,29 @@ pub struct Checkpoint {
     pub at_rest: bool,
     /// Whether the printer has shown that it does not negotiate.
     pub one_way: bool,
+    /// Whether bytes were on their way to a printer that takes them.
+    pub flowing: bool,
     /// The jobs of the link that have ended, the last one first.
     pub past: [PastJob; PAST],
+}
+
+impl Checkpoint {
+    /// What is left when the board was reset from outside, which may have come between a strobe and its mark: then nobody knows
+    /// whether the printer has that byte, and a job whose bytes were on their way is lost. Its own watchdog acts only when nothing
+    /// has moved for seconds.
+    #[must_use]
+    pub fn reset_from_outside(mut self) -> Checkpoint {
+        let Progress { job, printed, .. } = self.progress;
+        if self.flowing && self.progress.is_open() && self.past.iter().all(|past| past.job != job) {
+            self.progress.state = JobState::Lost;
+            self.needs_reset = true;
+            if job != LOCAL && job != ALONE {
+                self.past.rotate_right(1);
+                self.past[0] = PastJob { job, state: JobState::Lost, printed };
+            }
+        }
+        self
+    }
 }
 
 /// A task, and the number of the host's question if it answers one.
@@ -253,7 +274,7 @@ impl<'m> Engine<'m> {
     /// An engine that continues where another one was when it was reset.
     pub fn resume(memory: Memory<'m>, identity: Identity, checkpoint: Checkpoint) -> Self {
         let mut engine = Self::new(memory, identity);
-        let Checkpoint { progress, ends_at, needs_reset, at_rest, one_way, past } = checkpoint;
+        let Checkpoint { progress, ends_at, needs_reset, at_rest, one_way, past, .. } = checkpoint;
         (engine.owes_reset, engine.at_rest, engine.one_way) = (needs_reset, at_rest, one_way);
         engine.past = past;
         if progress.job == 0 || !progress.is_open() {
@@ -290,6 +311,13 @@ impl<'m> Engine<'m> {
         engine
     }
 
+    /// Its memory, for the engine after a reset of a simulated board.
+    #[cfg(any(test, feature = "simulation"))]
+    pub fn into_memory(self) -> Memory<'m> {
+        let (band, decoder) = self.streams.into_memory();
+        Memory { data: self.data.into_memory(), output: self.output.into_memory(), band, decoder }
+    }
+
     /// What must be kept so that [`Engine::resume`] can continue.
     pub fn checkpoint(&self) -> Checkpoint {
         let mut progress = self.progress();
@@ -303,6 +331,7 @@ impl<'m> Engine<'m> {
             needs_reset: self.owes_reset,
             at_rest: self.at_rest,
             one_way: self.one_way,
+            flowing: self.fault.is_none() && !self.output().is_empty(),
             past: self.past,
         }
     }
@@ -449,6 +478,15 @@ impl<'m> Engine<'m> {
         self.owes_reset &= !noticed;
         if noticed {
             (self.at_rest, self.one_way) = (true, false);
+        }
+    }
+
+    /// Has the printer reset unless it is known to stand between two jobs. One with a fault waits for its end, since its supply may
+    /// be gone for too short a time to count yet.
+    fn reset_unless_at_rest(&mut self) {
+        self.owes_reset |= !self.at_rest;
+        if self.fault.is_none() {
+            self.reset_if_owed();
         }
     }
 

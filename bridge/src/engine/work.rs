@@ -89,7 +89,7 @@ impl Engine<'_> {
     fn end_raw(&mut self) {
         let Some(job) = &mut self.job else { return };
         let foreign = self.sent.is_foreign();
-        let whole = job.used == job.length;
+        let whole = job.used == job.length && !job.cut;
         let open = job.used > 0 && self.sent.is_open() && !foreign;
         let cancelled = job.cancel != Cancel::None;
         let state = match (whole && !open, cancelled) {

@@ -553,3 +553,46 @@ fn a_board_without_an_area_says_so() {
     let expected = ToHost::Stored { request: 3, count: 0, room: 0, total: 0, job: None };
     assert_eq!(frame::decode::<ToHost>(bytes), Ok(expected));
 }
+
+#[test]
+fn a_stored_job_whose_first_page_has_changed_is_broken_and_not_done() {
+    let mut random = seeded(31);
+    for kind in [JobKind::Raw, JobKind::Streams] {
+        let (mut board, flash) = (Board::new(2048, 4096), ModelFlash::new(60, &mut random));
+        let (mut bridge, mut printer) = (Bridge::start(&mut board, &flash), Printer::default());
+        let planes = model::Planes::random(&mut random);
+        let data = if kind == JobKind::Raw { planes.printed() } else { planes.streams() };
+        let start = data[..data.len().min(100)].to_vec();
+        store(&mut bridge, &mut printer, &Job { id: 101, kind, data, expected: Vec::new() });
+        let at = flash.bytes().windows(start.len()).position(|piece| piece == start).expect("it is there");
+        flash.flip(at, 3);
+        bridge.tell(ToBridge::PrintStored { job: 501, stored: 101 });
+        settle(&mut bridge, &mut printer);
+        let Progress { job, state, printed, .. } = bridge.progress();
+        assert!(job == 501 && matches!(state, JobState::Broken(_)) && printed == 0, "{kind:?}: {state:?}");
+        assert!(printer.since.is_empty());
+    }
+}
+
+#[test]
+fn a_plain_job_that_the_loss_of_the_supply_cuts_in_two_leaves_a_note() {
+    let mut random = seeded(32);
+    let (mut board, flash) = (Board::new(2048, 4096), ModelFlash::new(40, &mut random));
+    let (mut bridge, mut printer) = (Bridge::start(&mut board, &flash), Printer::default());
+    let stream = model::Planes::random(&mut random).printed();
+    for piece in stream[..stream.len() / 2].chunks(64) {
+        bridge.engine.local(piece);
+        settle(&mut bridge, &mut printer);
+    }
+    let mut other = Board::new(2048, 4096);
+    let again = Bridge::start(&mut other, &flash);
+    assert!(again.engine.owes_reset(), "whatever comes next");
+    // One that has come to its end leaves none.
+    for piece in stream[stream.len() / 2..].chunks(64) {
+        bridge.engine.local(piece);
+        settle(&mut bridge, &mut printer);
+    }
+    assert_eq!(bridge.progress().state, JobState::Done);
+    let mut other = Board::new(2048, 4096);
+    assert!(!Bridge::start(&mut other, &flash).engine.owes_reset());
+}

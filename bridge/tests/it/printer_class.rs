@@ -24,7 +24,10 @@ impl Rig {
     fn new() -> Rig {
         let mut intake = Intake::new();
         intake.connect(0);
-        let engine = Engine::new(memory(2048, 4096, 40_000), IDENTITY);
+        let mut engine = Engine::new(memory(2048, 4096, 40_000), IDENTITY);
+        // The printer has just been switched on, so it needs no reset.
+        engine.port(Lines(0), Some(Fault::PowerOff));
+        engine.port(Lines::IDLE, None);
         Rig { engine, intake, now: 0, printed: Vec::new(), pace: 400 }
     }
 

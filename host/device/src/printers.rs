@@ -5,11 +5,12 @@
 //! Method: a folder for the whole computer. Before the first byte of a job leaves, the file `open.PRINTER.JOB` is made durable
 //! there. It is removed when the job is known to have ended in an orderly way, or when the printer was reset. So a crash
 //! leaves it behind, whatever crashed. The folder is sticky: nobody can remove a file of another user. Whoever learns that
-//! another user's job has ended writes `closed.PRINTER.JOB` instead, which counts the same. Files are [durable]
-//! and whole; links are never followed.
+//! another user's job has ended writes `closed.PRINTER.JOB` instead. It counts for whoever wrote it, and for everybody if root or the
+//! owner of the open note did: this program cannot know whether another user may open the bridge. Files are [durable] and
+//! whole; links are never followed; a folder with a note's name is none.
 //! A bridge is known by its serial number, however it is reached, because it has one port. A raw device is known by its path.
 //! Limits: another computer that shares a bridge over the network does not see the folder. A user who may print may also
-//! write false facts here, as they may send false bytes to the printer: the worst that follows is a needless reset.
+//! write false facts here: the worst that follows is a needless reset.
 //! Source: `docs/decisions/reset-owed-by-the-printer.md`.
 
 use std::fmt;
@@ -115,7 +116,7 @@ impl Unfinished {
     }
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(PartialEq, Eq, Default, Serialize, Deserialize)]
 struct Fact {
     boot: Option<u32>,
     /// When it was written, in seconds since 1970: for whoever looks into the folder.
@@ -146,6 +147,10 @@ fn io_error(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Printe
     move |source| PrintersError::Io { what, path, source }
 }
 
+/// What was noted at some moment.
+#[derive(Clone, Debug)]
+pub struct Noted(Vec<String>);
+
 /// The folder of facts about printers.
 #[derive(Clone, Debug)]
 pub struct Printers {
@@ -163,7 +168,7 @@ fn own_folder(journal: &Journal) -> PathBuf {
 
 impl Printers {
     /// The computer's folder: `FOILPRESS_PRINTERS`; else the folder all users share, if it is there and can be written; else one
-    /// of this user's own, which [`Printers::note`] then tells.
+    /// of this user's own, which [`Printers::notes`] then tell.
     pub fn of_system() -> Result<Printers, PrintersError> {
         if let Some(folder) = std::env::var_os("FOILPRESS_PRINTERS").filter(|value| !value.is_empty()) {
             return Printers::at(Path::new(&folder));
@@ -181,7 +186,7 @@ impl Printers {
 
     /// The facts in this folder, which is made if need be.
     pub fn at(folder: &Path) -> Result<Printers, PrintersError> {
-        durable::make_folder(folder).map_err(io_error("make", folder))?;
+        durable::make_folder(folder, Access::Everyone).map_err(io_error("make", folder))?;
         Ok(Printers { folder: folder.to_path_buf(), instead_of: None, own: None })
     }
 
@@ -195,15 +200,25 @@ impl Printers {
         self.own.as_deref().or(self.instead_of.as_deref())
     }
 
-    /// What the user should know when the facts are not shared.
-    pub fn note(&self) -> Option<String> {
-        self.instead_of.as_ref().map(|shared| {
+    /// What the user should know: that the facts are not shared, and what lies among them and is none.
+    pub fn notes(&self) -> Vec<String> {
+        let shared = self.instead_of.as_ref().map(|shared| {
             format!(
                 "{} cannot be written, so other users and print queues do not learn of a job that leaves the printer in need of \
                  a reset; the Debian package and `foilpress queue install` make that folder",
                 shared.display()
             )
-        })
+        });
+        let names = self.names().unwrap_or_default();
+        let rubbish =
+            names.into_iter().find(|name| name.starts_with("open.") && !is_note(&self.folder.join(name)));
+        let rubbish = rubbish.map(|name| {
+            format!(
+                "{} is no file of this program and says nothing of a printer; remove it",
+                self.folder.join(crate::connection::printable(&name)).display()
+            )
+        });
+        shared.into_iter().chain(rubbish).collect()
     }
 
     /// Notes, before its first byte leaves, that the printer may hold a part of this job. When this returns it is on disk. The
@@ -254,8 +269,7 @@ impl Printers {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
             // Another user's, in a sticky folder.
             Err(error) if error.kind() == io::ErrorKind::PermissionDenied => {
-                let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
-                self.write(&self.path("closed", printer, job), &Fact { boot: None, since })
+                self.write(&self.path("closed", printer, job), &fact(&open).unwrap_or_default())
             }
             Err(error) => Err(io_error("remove", &open)(error)),
         }
@@ -267,45 +281,39 @@ impl Printers {
         let mut found = Vec::new();
         for name in self.names()? {
             let Some(job) = name.strip_prefix(&prefix) else { continue };
-            if self.folder.join(closed(&name)).symlink_metadata().is_err() {
-                found.push(Unfinished { job: job.to_owned(), boot: self.boot(&name) });
+            let path = self.folder.join(&name);
+            if is_note(&path) && !is_closed(&path, &self.folder.join(closed(&name))) {
+                let boot = fact(&path).and_then(|fact| fact.boot);
+                found.push(Unfinished { job: job.to_owned(), boot });
             }
         }
         Ok(found)
     }
 
-    /// Notes that a printer was reset and holds nothing any more; without one, that all were.
-    pub fn reset(&self, printer: Option<&Printer>) -> Result<(), PrintersError> {
-        let of = printer.map(|printer| format!("open.{}.", printer.file_name()));
-        for name in self.names()? {
-            let mut parts = name.splitn(3, '.');
-            if parts.next() != Some("open") || of.as_ref().is_some_and(|of| !name.starts_with(of)) {
-                continue;
-            }
-            let path = self.folder.join(&name);
+    /// What is noted of a printer now; without one, of all. To be asked for before the printer is reset: a job that begins
+    /// behind the reset has a note of its own.
+    pub fn noted(&self, printer: Option<&Printer>) -> Result<Noted, PrintersError> {
+        let of = printer.map_or_else(|| "open.".into(), |printer| format!("open.{}.", printer.file_name()));
+        let notes = |name: &String| name.starts_with(&of) && is_note(&self.folder.join(name));
+        Ok(Noted(self.names()?.into_iter().filter(notes).collect()))
+    }
+
+    /// Notes that a printer was reset and holds nothing any more of what was noted before.
+    pub fn reset(&self, noted: &Noted) -> Result<(), PrintersError> {
+        for name in &noted.0 {
+            let path = self.folder.join(name);
             match fs::remove_file(&path) {
                 Ok(()) => {
-                    let _ = fs::remove_file(self.folder.join(closed(&name)));
+                    let _ = fs::remove_file(self.folder.join(closed(name)));
                 }
                 Err(error) if error.kind() == io::ErrorKind::NotFound => {}
                 Err(error) if error.kind() == io::ErrorKind::PermissionDenied => {
-                    self.write(&self.folder.join(closed(&name)), &Fact { boot: None, since: 0 })?;
+                    self.write(&self.folder.join(closed(name)), &fact(&path).unwrap_or_default())?;
                 }
                 Err(error) => return Err(io_error("remove", &path)(error)),
             }
         }
         self.sync()
-    }
-
-    fn boot(&self, name: &str) -> Option<u32> {
-        let path = self.folder.join(name);
-        // A link or a device in its place says nothing, which counts as the worst.
-        if !path.symlink_metadata().is_ok_and(|found| found.is_file()) {
-            return None;
-        }
-        let mut text = String::new();
-        File::open(path).ok()?.take(LARGEST).read_to_string(&mut text).ok()?;
-        serde_json::from_str::<Fact>(&text).ok()?.boot
     }
 
     fn names(&self) -> Result<Vec<String>, PrintersError> {
@@ -333,9 +341,12 @@ impl Printers {
         for name in self.names().unwrap_or_default() {
             if let Some(rest) = name.strip_prefix("closed.") {
                 let open = self.folder.join(format!("open.{rest}"));
+                let closed = self.folder.join(&name);
                 // The open one first: without it the other means nothing.
-                if fs::remove_file(&open).is_ok() || open.symlink_metadata().is_err() {
-                    let _ = fs::remove_file(self.folder.join(&name));
+                if is_closed(&open, &closed) && fs::remove_file(&open).is_ok()
+                    || open.symlink_metadata().is_err()
+                {
+                    let _ = fs::remove_file(closed);
                 }
             }
         }
@@ -345,6 +356,36 @@ impl Printers {
 /// The name of the file that says that a printer does not negotiate.
 fn one_way(printer: &Printer) -> String {
     format!("one-way.{}", printer.file_name())
+}
+
+/// Whether this is a note, or a link in its place. A folder, or whatever else somebody has put there, is none.
+fn is_note(path: &Path) -> bool {
+    path.symlink_metadata().is_ok_and(|found| found.is_file() || found.is_symlink())
+}
+
+/// What a note says. A link or a device in its place says nothing, which counts as the worst.
+fn fact(path: &Path) -> Option<Fact> {
+    if !path.symlink_metadata().is_ok_and(|found| found.is_file()) {
+        return None;
+    }
+    let mut text = String::new();
+    File::open(path).ok()?.take(LARGEST).read_to_string(&mut text).ok()?;
+    serde_json::from_str(&text).ok()
+}
+
+/// Whether an open note is closed by somebody whose word counts, and this very note: a job that begins once more has another.
+fn is_closed(open: &Path, closed: &Path) -> bool {
+    let Ok(found) = closed.symlink_metadata() else { return false };
+    #[cfg(unix)]
+    let counts = {
+        use std::os::unix::fs::MetadataExt as _;
+        let me = rustix::process::geteuid().as_raw();
+        let owner = open.symlink_metadata().map(|open| open.uid()).ok();
+        found.uid() == 0 || found.uid() == me || Some(found.uid()) == owner
+    };
+    #[cfg(not(unix))]
+    let counts = open.symlink_metadata().is_ok();
+    found.is_file() && counts && fact(open).unwrap_or_default() == fact(closed).unwrap_or_default()
 }
 
 /// The name of the file that closes the one of this name.
@@ -366,7 +407,7 @@ fn shared_folder() -> Option<PathBuf> {
 /// Makes the folder all users share, for an administrator: everyone may add to it, and nobody remove what is another's.
 pub fn make_shared_folder() -> Result<(), PrintersError> {
     let Some(folder) = shared_folder() else { return Ok(()) };
-    durable::make_folder(&folder).map_err(io_error("make", &folder))?;
+    durable::make_folder(&folder, Access::Everyone).map_err(io_error("make", &folder))?;
     #[cfg(unix)]
     fs::set_permissions(&folder, std::os::unix::fs::PermissionsExt::from_mode(0o1777))
         .map_err(io_error("make", &folder))?;
@@ -398,9 +439,14 @@ mod tests {
         let left = Unfinished { job: "0000000b".into(), boot: Some(5) };
         // Another process sees the same.
         assert_eq!(Printers::at(folder.path()).unwrap().unfinished(&one).unwrap(), [left]);
-        printers.reset(Some(&one)).unwrap();
+        // One that begins behind the reset stays.
+        let noted = printers.noted(Some(&one)).unwrap();
+        printers.begin(&one, "0000000d", Some(5)).unwrap();
+        printers.reset(&noted).unwrap();
+        assert_eq!([&one, &two, &device].map(count), [1, 1, 1]);
+        printers.reset(&printers.noted(Some(&one)).unwrap()).unwrap();
         assert_eq!([&one, &two, &device].map(count), [0, 1, 1]);
-        printers.reset(None).unwrap();
+        printers.reset(&printers.noted(None).unwrap()).unwrap();
         assert_eq!([&one, &two, &device].map(count), [0, 0, 0]);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }
@@ -411,11 +457,38 @@ mod tests {
         let printers = Printers::at(folder.path()).unwrap();
         let printer = Printer::Bridge(1);
         printers.begin(&printer, "0000000a", Some(5)).unwrap();
-        fs::write(folder.path().join("closed.bridge-0000000000000001.0000000a"), "{}").unwrap();
+        let [open, closed] = ["open", "closed"].map(|kind| printers.path(kind, &printer, "0000000a"));
+        fs::copy(open, closed).unwrap();
         assert_eq!(printers.unfinished(&printer).unwrap(), []);
+        // The same job has begun once more since, in another start of the bridge.
+        printers
+            .write(&printers.path("open", &printer, "0000000a"), &Fact { boot: Some(6), since: 1 })
+            .unwrap();
+        assert_eq!(printers.unfinished(&printer).unwrap().len(), 1);
+        printers.close(&printer, "0000000a").unwrap();
         printers.begin(&printer, "0000000b", Some(5)).unwrap();
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
         assert_eq!(printers.unfinished(&printer).unwrap().len(), 1);
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn what_a_stranger_has_closed_stays_open_and_a_folder_in_place_of_a_note_is_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let printers = Printers::at(folder.path()).unwrap();
+        let printer = Printer::Bridge(1);
+        fs::create_dir(folder.path().join("open.bridge-0000000000000001.0000000f")).unwrap();
+        printers.begin(&printer, "0000000a", Some(5)).unwrap();
+        let [open, closed] = ["open", "closed"].map(|kind| printers.path(kind, &printer, "0000000a"));
+        fs::copy(open, &closed).unwrap();
+        assert_eq!(printers.unfinished(&printer).unwrap(), []);
+        // Where the test may choose whose a file is.
+        if std::os::unix::fs::lchown(&closed, Some(65_534), None).is_ok() {
+            printers.begin(&printer, "0000000b", Some(5)).unwrap();
+            assert_eq!(printers.unfinished(&printer).unwrap().len(), 2);
+        }
+        printers.reset(&printers.noted(None).unwrap()).unwrap();
+        assert_eq!(printers.unfinished(&printer).unwrap(), []);
     }
 
     #[test]
@@ -494,7 +567,7 @@ mod tests {
         }
         assert_eq!(printers.unfinished(&one).unwrap(), []);
         // A reset is no other printer.
-        printers.reset(None).unwrap();
+        printers.reset(&printers.noted(None).unwrap()).unwrap();
         assert!(printers.is_one_way(&one));
         for _ in 0..2 {
             printers.note_one_way(&one, false).unwrap();

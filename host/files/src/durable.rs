@@ -57,17 +57,25 @@ pub fn place(from: &Path, to: &Path) -> io::Result<()> {
     place_on(&mut System, from, to)
 }
 
-/// Makes a folder and those above it, as far as they are missing.
+/// Makes a folder and those above it, as far as they are missing. A private one is for its owner alone; who may look into another one,
+/// the owner's mask says.
 ///
 /// # Errors
 /// What the system says.
-pub fn make_folder(path: &Path) -> io::Result<()> {
+pub fn make_folder(path: &Path, access: Access) -> io::Result<()> {
     if path.is_dir() {
         return Ok(());
     }
     let above = folder_of(path);
-    make_folder(above)?;
-    match fs::create_dir(path) {
+    make_folder(above, access)?;
+    let mut folder = fs::DirBuilder::new();
+    #[cfg(unix)]
+    if access == Access::Private {
+        std::os::unix::fs::DirBuilderExt::mode(&mut folder, 0o700);
+    }
+    #[cfg(not(unix))]
+    let _ = (access, &mut folder);
+    match folder.create(path) {
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists && path.is_dir() => {}
         made => made?,
     }

@@ -8,13 +8,22 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use tempfile::TempDir;
+use tempfile::{Builder, TempDir};
+
+const PREFIX: &str = ".foilpress-";
 
 static FOLDERS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// The list of all folders. No folder is made or kept while the guard lives.
 pub fn folders() -> MutexGuard<'static, Vec<PathBuf>> {
     FOLDERS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Has a temporary folder made for this user alone.
+pub fn private<'b, 'p, 's>(builder: &'b mut Builder<'p, 's>) -> &'b mut Builder<'p, 's> {
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o700));
+    builder
 }
 
 /// A temporary folder.
@@ -26,18 +35,22 @@ impl Scratch {
     /// # Errors
     /// The folder cannot be made.
     pub fn beside(parent: &Path) -> io::Result<Scratch> {
-        let mut folders = folders();
-        let folder = tempfile::Builder::new().prefix(".foilpress-").tempdir_in(parent)?;
-        folders.push(folder.path().to_path_buf());
-        Ok(Scratch(folder))
+        Scratch::made(tempfile::Builder::new().prefix(PREFIX), parent)
     }
 
-    /// Makes a folder in the system's folder for temporary files.
+    /// Makes a folder in the system's folder for temporary files, for this user alone.
     ///
     /// # Errors
     /// The folder cannot be made.
     pub fn new() -> io::Result<Scratch> {
-        Scratch::beside(&std::env::temp_dir())
+        Scratch::made(private(tempfile::Builder::new().prefix(PREFIX)), &std::env::temp_dir())
+    }
+
+    fn made(builder: &mut Builder<'_, '_>, parent: &Path) -> io::Result<Scratch> {
+        let mut folders = folders();
+        let folder = builder.tempdir_in(parent)?;
+        folders.push(folder.path().to_path_buf());
+        Ok(Scratch(folder))
     }
 
     /// Its path.
@@ -59,5 +72,17 @@ impl Drop for Scratch {
         if let Ok(mut folders) = FOLDERS.try_lock() {
             folders.retain(|path| path != self.0.path());
         }
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt as _;
+
+    #[test]
+    fn what_a_document_leaves_on_the_way_is_for_its_owner_alone() {
+        let folder = Scratch::new().unwrap();
+        assert_eq!(std::fs::metadata(folder.path()).unwrap().permissions().mode() & 0o777, 0o700);
     }
 }

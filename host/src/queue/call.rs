@@ -86,10 +86,12 @@ impl Call {
         let to = uri::parse(&text("DEVICE_URI").ok_or(CallError::NoUri)?)?;
         let options = options::parse(&options.to_string_lossy());
         let uuid = options.iter().find(|(name, _)| name == "job-uuid").map(|(_, value)| value.as_str());
-        // A job without an identity is known by its number and title.
+        // A user may give any option, the scheduler's own among them, but not another one's number. A job without an identity is
+        // known by its title, too.
+        let number = file_name(&job.to_string_lossy());
         let identity = match uuid.map(|uuid| file_name(uuid.strip_prefix("urn:uuid:").unwrap_or(uuid))) {
-            Some(uuid) if !uuid.is_empty() => uuid,
-            _ => format!("job-{}-{}", file_name(&job.to_string_lossy()), file_name(&title.to_string_lossy())),
+            Some(uuid) if !uuid.is_empty() => format!("{uuid}-{number}"),
+            _ => format!("job-{number}-{}", file_name(&title.to_string_lossy())),
         };
         let queue = text("PRINTER").unwrap_or_default();
         let listed = (queue.clone(), format!("{queue}-{}", job.to_string_lossy()));
@@ -134,9 +136,13 @@ mod tests {
         let options = "media=A4 job-uuid=urn:uuid:0f0e-/../x copies=3";
         let call = Call::read(&arguments(&["7", "me", "My title", "3", options, "/spool/d7"]), &environment)
             .unwrap();
-        assert_eq!((call.identity.as_str(), call.copies, call.in_class), ("0f0e-x", 3, false));
+        assert_eq!((call.identity.as_str(), call.copies, call.in_class), ("0f0e-x-7", 3, false));
         assert_eq!(call.journal, Path::new("/var/cache/cups/foilpress/Alps"));
         assert_eq!(call.listed, ("Alps".into(), "Alps-7".into()));
+        // Another user's option is not another user's job.
+        let other =
+            Call::read(&arguments(&["8", "you", "My title", "3", options, "/spool/d8"]), &environment);
+        assert_ne!(other.unwrap().identity, call.identity);
         // On standard input the filters have made the copies.
         let call = Call::read(&arguments(&["7", "me", "../t", "3", ""]), &environment).unwrap();
         assert_eq!((call.identity.as_str(), call.copies), ("job-7-t", 1));

@@ -113,7 +113,7 @@ pub fn put(wanted: &Wanted) -> io::Result<bool> {
     if fs::read_to_string(&wanted.path).is_ok_and(|text| text == wanted.text) {
         return Ok(false);
     }
-    durable::make_folder(wanted.path.parent().unwrap_or(Path::new("/")))?;
+    durable::make_folder(wanted.path.parent().unwrap_or(Path::new("/")), Access::Everyone)?;
     let access = if wanted.executable { Access::Program } else { Access::Everyone };
     durable::write(&wanted.path, wanted.text.as_bytes(), access)?;
     Ok(true)
@@ -121,7 +121,7 @@ pub fn put(wanted: &Wanted) -> io::Result<bool> {
 
 /// Copies the program to a folder that only root can change.
 pub fn copy_program(from: &Path, to: &Path) -> io::Result<()> {
-    durable::make_folder(to.parent().unwrap_or(Path::new("/")))?;
+    durable::make_folder(to.parent().unwrap_or(Path::new("/")), Access::Everyone)?;
     durable::write(to, &fs::read(from)?, Access::Program)
 }
 

@@ -7,6 +7,7 @@ use press::simulate;
 use serde_json::Value;
 use sheet::Sheet;
 
+use testing::device::Device;
 use testing::program::{Bench, small_document, text};
 
 const SMALL: &str = "--size 12x8mm --paper postcard";
@@ -116,12 +117,12 @@ fn differences_say_what_they_count() {
 fn nothing_is_sent_before_the_plan_was_confirmed() {
     let bench = Bench::new();
     small_document(&bench.path("tile"));
-    fs::write(bench.path("port"), "").unwrap();
+    let mut port = Device::at(&bench.path("port"));
     let said = bench.refused(1, &format!("print tile {SMALL} -q --to raw:port"));
     assert!(said.contains("--yes"), "{said}");
-    assert!(fs::read(bench.path("port")).unwrap().is_empty(), "something was sent");
+    assert!(port.taken().is_empty(), "something was sent");
     bench.done(&format!("print tile {SMALL} -q --to raw:port --yes"));
-    assert!(fs::read(bench.path("port")).unwrap() == fs::read(bench.path("tile.print/job.rgl")).unwrap());
+    assert!(port.taken() == fs::read(bench.path("tile.print/job.rgl")).unwrap());
 }
 
 #[test]
@@ -130,13 +131,13 @@ fn copies_wait_for_enter_and_every_ribbon_is_counted() {
     small_document(&bench.path("tile"));
     bench.done(&format!("print tile {SMALL} -q --media film --to file:job.rgl"));
     let job = fs::read(bench.path("job.rgl")).unwrap();
-    let send = |answers: &str| {
-        fs::write(bench.path("port"), "").unwrap();
+    let mut port = Device::at(&bench.path("port"));
+    let mut send = |answers: &str| {
         let output = bench.answered("send job.rgl --to raw:port --copies 3", answers);
-        (output.status.code(), text(&output.stderr), fs::read(bench.path("port")).unwrap().len())
+        (output.status.code(), text(&output.stderr), port.taken().len())
     };
     let (code, _, length) = send("\n\n");
-    assert_eq!((code, length), (Some(0), job.len()), "a file as device is written from its beginning");
+    assert_eq!((code, length), (Some(0), 3 * job.len()));
     let (code, said, _) = send("\n");
     assert_eq!(code, Some(1));
     assert!(said.contains("2 of 3 sheets are sent") && said.contains("--copies 1"), "{said}");

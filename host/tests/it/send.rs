@@ -14,6 +14,7 @@ use protocol::paper::Paper;
 use protocol::rgl::Page;
 use sheet::Plane;
 use tempfile::TempDir;
+use testing::device::Device;
 
 /// A folder with a small job, and a journal of its own.
 struct Bench {
@@ -31,6 +32,11 @@ impl Bench {
             .expect("a legal job");
         fs::write(folder.path().join("job.rgl"), &job).expect("the job is written");
         Bench { folder, job }
+    }
+
+    /// A device beside the job, called `port`.
+    fn device(&self) -> Device {
+        Device::at(&self.folder.path().join("port"))
     }
 
     fn run(&self, args: &str) -> Output {
@@ -56,8 +62,7 @@ impl Bench {
 #[test]
 fn what_is_not_one_whole_job_is_refused_before_the_first_byte() {
     let bench = Bench::new();
-    let path = bench.folder.path().join("port");
-    fs::write(&path, "").unwrap();
+    let mut port = bench.device();
     let mut twice = bench.job.clone();
     twice.extend_from_slice(&bench.job);
     for wrong in [&bench.job[..bench.job.len() - 1], &twice, b"hello, printer\n", b""] {
@@ -67,7 +72,7 @@ fn what_is_not_one_whole_job_is_refused_before_the_first_byte() {
             assert!(said.contains("not sent") && said.contains("byte"), "{said}");
         }
     }
-    assert!(fs::read(&path).unwrap().is_empty(), "something was sent");
+    assert!(port.taken().is_empty(), "something was sent");
     assert!(!bench.folder.path().join("out.rgl").exists());
     assert!(!bench.folder.path().join("jobs").exists(), "something was queued");
 }
@@ -76,16 +81,19 @@ fn what_is_not_one_whole_job_is_refused_before_the_first_byte() {
 fn a_file_and_a_raw_device_get_the_job_byte_for_byte() {
     let bench = Bench::new();
     bench.says(0, "send job.rgl --to file:copy.rgl");
-    fs::write(bench.folder.path().join("port"), "").unwrap();
+    let mut port = bench.device();
     let said = bench.says(0, "send job.rgl --to raw:port");
     assert!(said.contains("white (MDC-SCWH)"), "the cartridge is named: {said}");
     assert!(
         said.contains("whether they are printed, only the printer shows"),
         "queued is not printed: {said}"
     );
-    for name in ["copy.rgl", "port"] {
-        assert!(fs::read(bench.folder.path().join(name)).unwrap() == bench.job, "{name}");
-    }
+    assert!(
+        fs::read(bench.folder.path().join("copy.rgl")).unwrap() == bench.job && port.taken() == bench.job
+    );
+    // A file is no device, and stays as it is.
+    let said = bench.says(1, "send job.rgl --to raw:copy.rgl");
+    assert!(said.contains("is a file and no device") && said.contains("file:copy.rgl"), "{said}");
 }
 
 #[test]
@@ -148,16 +156,15 @@ fn a_wrong_destination_is_wrong_usage_and_the_right_ones_are_shown() {
 #[test]
 fn a_device_that_may_hold_part_of_a_job_gets_nothing_until_its_switch_was_used() {
     let bench = Bench::new();
-    let port = bench.folder.path().join("port");
-    fs::write(&port, "").unwrap();
+    let (path, mut port) = (bench.folder.path().join("port"), bench.device());
     let printers = Printers::at(&bench.folder.path().join("printers")).unwrap();
     // As it is left by a process that was killed.
-    printers.begin(&Printer::Device(port.clone()), "raw-1-1", None).unwrap();
+    printers.begin(&Printer::Device(path), "raw-1-1", None).unwrap();
     let said = bench.says(1, "send job.rgl --to raw:port");
     assert!(said.contains("not sent") && said.contains("bridge reset --by-hand"), "{said}");
-    assert!(fs::read(&port).unwrap().is_empty(), "something was sent");
+    assert!(port.taken().is_empty(), "something was sent");
     bench.says(0, "bridge reset --by-hand");
     bench.says(0, "send job.rgl --to raw:port");
-    assert!(fs::read(&port).unwrap() == bench.job);
+    assert!(port.taken() == bench.job);
     bench.says(0, "send job.rgl --to raw:port");
 }

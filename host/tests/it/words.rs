@@ -84,7 +84,7 @@ fn the_commonest_errors() {
     bench.done("chart calibration -o chart");
     let job = fs::read(bench.path("chart/job.rgl")).expect("a job");
     fs::write(bench.path("half.rgl"), &job[..job.len() / 2]).expect("half a job");
-    fs::write(bench.path("port"), "").expect("a port");
+    let _port = testing::device::Device::at(&bench.path("port"));
     let mut told = String::new();
     for args in [
         "print nowhere",

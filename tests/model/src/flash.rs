@@ -7,8 +7,7 @@
 use bridge::store::{Flash, PAGE, SECTOR};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::cell::RefCell;
-use std::rc::Rc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 struct Chip {
     bytes: Vec<u8>,
@@ -25,7 +24,7 @@ struct Chip {
 
 /// The flash. Clones are the same chip.
 #[derive(Clone)]
-pub struct ModelFlash(Rc<RefCell<Chip>>);
+pub struct ModelFlash(Arc<Mutex<Chip>>);
 
 impl ModelFlash {
     /// A chip of so many sectors, with anything in it.
@@ -36,7 +35,7 @@ impl ModelFlash {
             bytes.fill_with(|| random.random());
         }
         let erased = vec![0; sectors];
-        ModelFlash(Rc::new(RefCell::new(Chip {
+        ModelFlash(Arc::new(Mutex::new(Chip {
             bytes,
             erased,
             left: None,
@@ -47,45 +46,49 @@ impl ModelFlash {
         })))
     }
 
+    fn chip(&self) -> MutexGuard<'_, Chip> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// The supply goes in the middle of the operation after so many others.
     pub fn cut_after(&self, operations: u32) {
-        self.0.borrow_mut().left = Some(operations);
+        self.chip().left = Some(operations);
     }
 
     /// Whether the supply is gone.
     pub fn is_off(&self) -> bool {
-        self.0.borrow().off
+        self.chip().off
     }
 
     /// The supply is back.
     pub fn power_up(&self) {
-        let mut chip = self.0.borrow_mut();
+        let mut chip = self.chip();
         (chip.off, chip.left) = (false, None);
     }
 
     /// Operations until now.
     pub fn operations(&self) -> u32 {
-        self.0.borrow().operations
+        self.chip().operations
     }
 
     /// How often each sector was erased.
     pub fn erased(&self) -> Vec<u32> {
-        self.0.borrow().erased.clone()
+        self.chip().erased.clone()
     }
 
     /// From this byte on the chip does not keep zeros any more.
     pub fn wear_out(&self, from: usize) {
-        self.0.borrow_mut().worn = Some(from);
+        self.chip().worn = Some(from);
     }
 
     /// Changes a bit, as age does.
     pub fn flip(&self, byte: usize, bit: u8) {
-        self.0.borrow_mut().bytes[byte] ^= 1 << bit;
+        self.chip().bytes[byte] ^= 1 << bit;
     }
 
     /// What is in it.
     pub fn bytes(&self) -> Vec<u8> {
-        self.0.borrow().bytes.clone()
+        self.chip().bytes.clone()
     }
 }
 
@@ -120,11 +123,11 @@ impl Chip {
 
 impl Flash for ModelFlash {
     fn size(&self) -> u32 {
-        self.0.borrow().bytes.len() as u32
+        self.chip().bytes.len() as u32
     }
 
     fn read(&self, at: u32, out: &mut [u8]) {
-        let chip = self.0.borrow();
+        let chip = self.chip();
         for (i, byte) in out.iter_mut().enumerate() {
             *byte = chip.bytes.get(at as usize + i).copied().unwrap_or(0xff);
         }
@@ -136,7 +139,7 @@ impl Flash for ModelFlash {
             "bytes {at} and {} on lie in two pages",
             bytes.len()
         );
-        let mut chip = self.0.borrow_mut();
+        let mut chip = self.chip();
         let Some(part) = chip.operate() else { return };
         for (i, &byte) in bytes.iter().enumerate() {
             let at = at as usize + i;
@@ -149,7 +152,7 @@ impl Flash for ModelFlash {
     }
 
     fn erase(&mut self, sector: u32) {
-        let mut chip = self.0.borrow_mut();
+        let mut chip = self.chip();
         let Some(part) = chip.operate() else { return };
         chip.erased[sector as usize] += 1;
         let clears = part < 1.0 && chip.random.random_bool(0.5);

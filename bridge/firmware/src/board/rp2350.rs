@@ -8,6 +8,7 @@
 //!   count at all (data sheet, 12.6.2.2).
 //! * The watchdog counts once a tick: RP2040-E1 is not here. `embassy_rp` knows.
 
+use super::FLASH;
 use crate::flash::Whole;
 use core::ops::Range;
 use embassy_rp::otp;
@@ -52,7 +53,14 @@ pub fn serial_number(_flash: &mut Whole) -> [u8; 8] {
     otp::get_chipid().unwrap_or_default().to_be_bytes()
 }
 
-/// That of a Pico 2. `embassy_rp` cannot ask the chip on this processor.
+/// That of the chip. `embassy_rp` cannot ask it on this processor; but a chip begins anew behind its end, so at its size the image
+/// is seen once more. A Pico 2 has 4 MiB, other boards less or more.
 pub fn flash_bytes(_flash: &mut Whole) -> u32 {
-    4 << 20
+    let begins = |at: usize| {
+        let page = (FLASH + at) as *const u32;
+        // SAFETY: flash, which is mapped there as far as addresses of a chip reach. Nothing writes it now.
+        (0..256).map(move |word| unsafe { page.add(word).read_volatile() })
+    };
+    let again = |&size: &u32| begins(size as usize).eq(begins(0));
+    [1 << 20, 2 << 20, 4 << 20, 8 << 20].into_iter().find(again).unwrap_or(4 << 20)
 }

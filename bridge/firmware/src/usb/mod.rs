@@ -5,6 +5,7 @@
 //! cancel or a question is seen however much data is under way. The printer's endpoint is the exception, since its
 //! class has no other flow control.
 
+pub mod control;
 pub mod device;
 pub mod link;
 pub mod printer;
@@ -13,7 +14,7 @@ use embassy_rp::peripherals::USB;
 use embassy_rp::usb::Driver;
 
 /// The driver.
-pub type Usb = Driver<'static, USB>;
+pub type Usb = control::Watchful<Driver<'static, USB>>;
 /// A bulk endpoint to the host.
 pub type BulkIn = <Usb as embassy_usb::driver::Driver<'static>>::EndpointIn;
 /// A bulk endpoint from the host.

@@ -73,7 +73,8 @@ fn nothing_is_strobed_while_the_sense_line_is_low_and_everything_arrives_when_it
         }
         assert_eq!(bench.state(), JobState::Done, "{way}, {handshake:?}");
         assert!(bench.cable.taken() == *expected, "{way}, {handshake:?}: other bytes on the paper");
-        assert_eq!(bench.cable.resets(), 0);
+        // A plain job came before anything was known of the printer.
+        assert!(bench.cable.resets() <= usize::from(way == "plain"));
     }
 }
 

@@ -211,12 +211,30 @@ fn what_cannot_be_followed_is_refused_with_the_reason() {
     assert_eq!(rig.tell(begin(1, JobKind::Raw, 50)).text, Vec::<String>::new());
     assert_eq!(rig.tell(begin(1, JobKind::Raw, 51)).text, refused(Refusal::OtherJob, 1));
     assert_eq!(rig.tell(begin(2, JobKind::Raw, 50)).text, refused(Refusal::JobOpen, 2));
-    assert_eq!(rig.tell(ToBridge::Initialise).text, refused(Refusal::JobOpen, 1));
     assert_eq!(rig.tell(ToBridge::Bootloader).text, refused(Refusal::JobOpen, 1));
     let question = rig.tell(ToBridge::Ask { request: 8, what: Ask::Printer });
     assert_eq!(question.text, [format!("{:?}", ToHost::Answer { request: 8, answer: Answer::NotNow })]);
     rig.engine.receive(&mut rig.reader, &framed_bytes(&[99, 1, 2]));
     assert_eq!(rig.said().text, refused(Refusal::Unknown, 0));
+}
+
+/// A host may have to reset the printer for what another job has left in it, when its own one is open already.
+#[test]
+fn a_job_of_which_nothing_has_crossed_is_printed_behind_a_reset_and_another_one_keeps_it_off() {
+    let stream = a_raw_job();
+    let mut rig = Rig::new();
+    rig.open(1, &stream, 0);
+    assert_eq!(rig.tell(ToBridge::Initialise).text, Vec::<String>::new());
+    assert_eq!(rig.engine.task(), Some(Task::Initialise));
+    // Data that come meanwhile wait.
+    rig.open(1, &stream, 900);
+    while rig.engine.work() {}
+    assert!(rig.engine.output().is_empty());
+    rig.engine.done(Outcome::Done);
+    assert!(!rig.engine.output().is_empty());
+    assert_eq!(rig.tell(ToBridge::Initialise).text, refused(Refusal::JobOpen, 1));
+    assert_eq!(rig.send(1, JobKind::Raw, &stream).state, JobState::Done);
+    assert!(rig.printed == stream);
 }
 
 /// A frame around bytes that are no message of this version.

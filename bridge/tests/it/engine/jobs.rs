@@ -3,7 +3,7 @@
 use super::{Rig, a_raw_job};
 use bridge::engine::Engine;
 use model::{IDENTITY, Job, NONE, Planes, is_a_whole_job, memory, run, seeded};
-use protocol::link::message::{DefectKind, JobKind, JobState, ToBridge};
+use protocol::link::message::{DefectKind, Fault, JobKind, JobState, Lines, PastJob, ToBridge};
 use protocol::walk::Placed;
 
 #[test]
@@ -168,4 +168,23 @@ fn a_page_too_wide_for_the_memory_is_refused_before_the_first_byte() {
 #[test]
 fn the_engine_fits_a_microcontroller() {
     assert!(size_of::<Engine>() <= 14 * 1024, "{} bytes", size_of::<Engine>());
+}
+
+#[test]
+fn a_reset_from_outside_loses_a_job_whose_bytes_were_flowing_and_no_other() {
+    let stream = a_raw_job();
+    let mut rig = Rig::new();
+    rig.open(7, &stream, stream.len().min(900));
+    while rig.engine.work() {}
+    rig.engine.port(Lines::IDLE, Some(Fault::PaperOut));
+    let stopped = rig.engine.checkpoint();
+    assert_eq!(stopped.reset_from_outside(), stopped, "nothing is strobed");
+    rig.engine.port(Lines::IDLE, None);
+    let flowing = rig.engine.checkpoint();
+    let again = Engine::resume(memory(2048, 2048, 40_000), IDENTITY, flowing.reset_from_outside());
+    assert_eq!((again.progress().state, again.owes_reset()), (JobState::Lost, true));
+    assert_eq!(again.checkpoint().past[0], PastJob { job: 7, state: JobState::Lost, printed: 0 });
+    rig.print();
+    let waits = rig.engine.checkpoint();
+    assert_eq!(waits.reset_from_outside(), waits, "nothing is on its way");
 }

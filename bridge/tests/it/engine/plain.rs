@@ -1,7 +1,7 @@
 //! Jobs through a plain printer interface, which has no frames and no numbers.
 
 use super::{Rig, a_raw_job, offer, refused};
-use bridge::engine::{LOCAL, Task};
+use bridge::engine::{LOCAL, Outcome, Task};
 use model::{Planes, is_a_whole_job, seeded};
 use protocol::link::message::{Fault, JobKind, JobState, Lines, Refusal, ToBridge};
 
@@ -97,4 +97,21 @@ fn the_link_and_a_plain_printer_interface_do_not_mix_their_jobs() {
     );
     engine.port(Lines::IDLE, None);
     assert_eq!(engine.task(), Some(Task::Initialise));
+}
+
+#[test]
+fn a_printer_of_which_nothing_is_known_is_reset_before_the_first_byte_of_a_plain_job() {
+    let stream = a_raw_job();
+    let mut rig = Rig::new();
+    for resets in [1, 0] {
+        let taken = rig.engine.local(&stream);
+        while rig.engine.work() {}
+        assert_eq!(rig.engine.task().into_iter().filter(|task| *task == Task::Initialise).count(), resets);
+        assert_eq!(rig.engine.output().is_empty(), resets > 0);
+        rig.engine.done(Outcome::Done);
+        offer(&mut rig, &stream[taken..], 64);
+        rig.print();
+        assert_eq!(rig.engine.progress().state, JobState::Done);
+    }
+    assert!(rig.printed == [&stream[..], &stream].concat());
 }

@@ -102,6 +102,11 @@ pub enum OpenError {
     /// Several bridges, by their serial numbers.
     #[error("several bridges are on USB; choose one by its serial number: {}", by_number(.0))]
     Several(Vec<Option<String>>),
+    /// Two bridges with this serial number.
+    #[error(
+        "two bridges have the serial number {0}, so nothing tells their printers apart; unplug one of them"
+    )]
+    Twins(String),
     /// Not allowed.
     #[error("{0}: permission denied; `foilpress doctor` shows what to set up")]
     Forbidden(Address),
@@ -133,9 +138,10 @@ fn choose(address: &Address, serial: Option<&str>) -> Result<usb::Attached, Open
     if let Some(serial) = serial {
         found.retain(|bridge| bridge.is(serial));
     }
-    match found.len() {
-        0 | 1 => found.pop().ok_or_else(|| OpenError::Absent(address.clone())),
-        _ => Err(OpenError::Several(found.into_iter().map(|bridge| bridge.serial_number).collect())),
+    match (found.len(), serial) {
+        (0 | 1, _) => found.pop().ok_or_else(|| OpenError::Absent(address.clone())),
+        (_, Some(serial)) => Err(OpenError::Twins(super::printable(serial))),
+        (_, None) => Err(OpenError::Several(found.into_iter().map(|bridge| bridge.serial_number).collect())),
     }
 }
 

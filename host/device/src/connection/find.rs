@@ -112,9 +112,24 @@ fn joined(ports: Vec<Port>, usb: Vec<Option<String>>) -> Survey {
     survey
 }
 
+/// The serial number that the bridge at this port shares with one at another: some clones of the board have none of their own. What
+/// is noted of one printer would then be taken for the other's.
+fn twin(ports: &[Port], address: &Address) -> Option<String> {
+    let serial =
+        |port: &Port| port.serial_number.as_deref().map(str::to_ascii_uppercase).filter(|_| port.bridge);
+    let own = serial(ports.iter().find(|port| port.address == *address)?)?;
+    let same = ports.iter().filter(|port| serial(port).as_ref() == Some(&own)).count();
+    (same > 1).then_some(own)
+}
+
 /// Opens an address; if nothing is there any more, or it fits several, the bridge with this number wherever it is now: a
-/// bridge that was plugged in again may have another port.
+/// bridge that was plugged in again may have another port. One that cannot be told from another is refused.
 pub fn open(address: &Address, number: Option<u64>) -> Result<Box<dyn Transport>, OpenError> {
+    if matches!(address, Address::Serial(_))
+        && let Some(serial) = twin(&ports(), address)
+    {
+        return Err(OpenError::Twins(super::printable(&serial)));
+    }
     let error = match address.open() {
         Ok(link) => return Ok(link),
         Err(error) => error,
@@ -124,9 +139,14 @@ pub fn open(address: &Address, number: Option<u64>) -> Result<Box<dyn Transport>
     if local
         && elsewhere
         && let Some(number) = number
-        && let Some(bridge) = survey().bridges.iter().find(|bridge| bridge.number() == Some(number))
     {
-        return bridge.open().map(|(_, link)| link);
+        let bridges = survey().bridges;
+        let mut fitting = bridges.iter().filter(|bridge| bridge.number() == Some(number));
+        match (fitting.next(), fitting.next()) {
+            (Some(bridge), None) => return bridge.open().map(|(_, link)| link),
+            (Some(_), Some(_)) => return Err(OpenError::Twins(format!("{number:016X}"))),
+            (None, _) => {}
+        }
     }
     Err(error)
 }
@@ -199,6 +219,21 @@ mod tests {
         );
         assert_eq!(addresses(&survey), [vec!["serial:a"], vec!["serial:b", "usb:e662"], vec!["usb:E663"]]);
         assert_eq!(survey.others, [port("c", Some("E661"), false)]);
+    }
+
+    #[test]
+    fn two_bridges_with_one_serial_number_are_refused_and_others_are_not() {
+        let ports = [
+            port("a", Some("E661"), true),
+            port("b", Some("e661"), true),
+            port("c", Some("E662"), true),
+            port("d", Some("E662"), false),
+            port("e", None, true),
+            port("f", None, true),
+        ];
+        let twins =
+            ["a", "b", "c", "d", "e", "f", "g"].map(|name| twin(&ports, &Address::Serial(name.into())));
+        assert_eq!(twins.map(|serial| serial.is_some()), [true, true, false, false, false, false, false]);
     }
 
     #[test]

@@ -7,8 +7,8 @@
 use std::collections::VecDeque;
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::sync::{Arc, Condvar, LazyLock, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 /// A pipe that takes nothing for this long gives control back.
 pub(super) const WRITE_PATIENCE: Duration = Duration::from_millis(50);
@@ -22,6 +22,12 @@ pub trait Transport: Send {
     /// Receives what has come, waiting for it at most `patience`; 0 when nothing has. An error is the end of the
     /// connection.
     fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize>;
+
+    /// The time by which everything at this pipe waits, since any moment before the first pipe was opened.
+    fn now(&self) -> Duration {
+        static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+        START.elapsed()
+    }
 }
 
 /// What a read or write with a time limit means here.

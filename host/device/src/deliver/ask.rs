@@ -5,7 +5,7 @@
 //! printer stands between two jobs. After a loss of its supply it does not; then what this computer has noted about the printer
 //! decides, the same notes by which a job is sent. A printer that has shown that it does not negotiate is noted by its bridge's
 //! serial number, and left alone.
-//! Limits: a job that an operating system printed through the bridge by itself leaves no note here.
+//! A job that an operating system printed through the bridge by itself leaves no note here: the bridge keeps one in its flash.
 
 use std::time::Duration;
 

@@ -4,16 +4,16 @@ use std::cell::Cell;
 use std::time::Duration;
 
 use protocol::ink::Ink;
-use protocol::link::message::{Fault, JobKind, Progress};
+use protocol::link::message::{Ask, Fault, JobKind, Progress};
 
 use super::ask::{self, Negotiate};
 use super::{Cartridges, Delivery, Ended, Failure, Job, News, Packed, Question, ResetOwed, number};
+use crate::connection::Address;
 use crate::connection::Bridge;
-use crate::connection::{Address, find};
 use crate::forms::{self, Content, streams};
 use crate::printers::{Printer, Printers, PrintersError, Standing};
 use crate::questions::query::{Query, Reply, is_alps};
-use crate::transit::finish::{self, Sheet, await_sheet};
+use crate::transit::finish::{Sheet, await_sheet};
 use crate::transit::journal::{Journal, JournalError, OpenJob};
 use crate::transit::session::{Outcome, Phase, Record, Session, SessionError};
 use crate::transit::{self, Event, RunError, Wish};
@@ -36,17 +36,19 @@ pub fn reset(query: &mut Query<'_>, printers: &Printers) -> Result<(), Failure> 
     if let (_, Some(Fault::PowerOff)) = query.lines(BRIDGE)? {
         return Err(Failure::PrinterOff);
     }
+    let noted = printers.noted(Some(&Printer::Bridge(query.bridge().serial)))?;
     query.initialise(BRIDGE)?;
-    Ok(printers.reset(Some(&Printer::Bridge(query.bridge().serial)))?)
+    Ok(printers.reset(&noted)?)
 }
 
 /// Gives up the job that is open at a bridge, whoever has sent it, and has the printer reset; notes for everybody that it was.
 /// Says what the bridge made of it.
 pub fn give_up(query: &mut Query<'_>, job: u32, printers: &Printers) -> Result<Progress, Failure> {
+    let noted = printers.noted(Some(&Printer::Bridge(query.bridge().serial)))?;
     let ended = query.abandon(job, BRIDGE)?;
     // A printer that is off is reset by the bridge when it is back, so the notes stay until then.
     if !matches!(query.lines(BRIDGE)?, (_, Some(Fault::PowerOff))) {
-        printers.reset(Some(&Printer::Bridge(query.bridge().serial)))?;
+        printers.reset(&noted)?;
     }
     Ok(ended)
 }
@@ -93,7 +95,7 @@ impl Delivery<'_> {
     /// known: that it holds no part of another job, and is one of ALPS as far as it says what it is. `bridge` is the serial
     /// number of the one that is meant, which is then found at any port.
     pub fn meet(&self, address: &Address, bridge: Option<u64>, inks: &[Ink]) -> Result<Met, Failure> {
-        let mut link = find::open(address, bridge)?;
+        let mut link = self.caller.open(address, bridge)?;
         let mut query = Query::new(&mut *link, BRIDGE)?;
         self.settle_earlier_jobs(&mut query)?;
         let fault = query.lines(BRIDGE)?.1;
@@ -121,7 +123,7 @@ impl Delivery<'_> {
     fn settle_earlier_jobs(&self, query: &mut Query<'_>) -> Result<(), Failure> {
         let (printer, boot) = (Printer::Bridge(query.bridge().serial), query.bridge().boot);
         let progress = *query.progress();
-        let mut owed = None;
+        let mut owed = Vec::new();
         for unfinished in self.printers.unfinished(&printer)? {
             match unfinished.standing(boot, &progress, query.past()) {
                 Standing::Ended { printed, whole } => {
@@ -131,17 +133,33 @@ impl Delivery<'_> {
                 }
                 Standing::WithBridge => {}
                 Standing::ResetOwed => {
-                    owed = Some(ResetOwed { printer: printer.clone(), job: unfinished.job });
+                    owed.push(ResetOwed { printer: printer.clone(), job: unfinished.job });
                 }
             }
         }
-        let Some(owed) = owed else { return Ok(()) };
+        let Some(last) = owed.last().cloned() else { return Ok(()) };
+        if self.is_between_jobs(query, &printer)? {
+            // Another user has had it reset, or has switched it off and on.
+            owed.iter().for_each(|owed| self.close(&printer, &owed.job));
+            return Ok(());
+        }
+        let owed = last;
         if !self.caller.agrees(&Question::Reset(&owed)) {
             return Err(Failure::ResetOwed(owed));
         }
         reset(query, self.printers)?;
         self.caller.tell(&News::Reset);
         Ok(())
+    }
+
+    /// Whether the bridge itself knows that the printer stands between two jobs. It says so by asking it for its status. A printer
+    /// that is disturbed by that is left alone, and then nobody knows.
+    fn is_between_jobs(&self, query: &mut Query<'_>, printer: &Printer) -> Result<bool, Failure> {
+        if self.printers.is_one_way(printer) {
+            return Ok(false);
+        }
+        let reply = query.printer(Ask::Printer, PRINTER)?;
+        Ok(matches!(reply, Reply::Bytes(_) | Reply::OneWay | Reply::Silent | Reply::Stopped(_)))
     }
 
     /// Sends a job of the journal, or with `cancel` brings it to its end, until the bridge says how it ended. Jobs of which no
@@ -233,11 +251,8 @@ impl Delivery<'_> {
             return Err(JournalError::NoSuchJob(old.entry.record.job).into());
         };
         let job = Job { name, content: Content::Bytes(&bytes), checked: &checked };
-        let packed = if kind == JobKind::Raw {
-            Packed { job, kind, data: job.content.bytes().into() }
-        } else {
-            Packed { job, kind, data: data.into() }
-        };
+        let packed =
+            if kind == JobKind::Raw { Packed::raw(job) } else { Packed { job, kind, data: data.into() } };
         self.queue(journal, &packed, &to)
     }
 
@@ -278,7 +293,8 @@ impl Delivery<'_> {
         watcher.serial.set(bridge);
         let result = transit::run_at(
             &mut session,
-            address,
+            &mut |bridge| self.caller.open(address, bridge),
+            &mut |time| self.caller.pause(time),
             &mut |record| {
                 watcher.before_saving(record, met)?;
                 Ok(job.save(record)?)
@@ -306,10 +322,11 @@ impl Delivery<'_> {
         }
     }
 
-    /// Waits, without limit, until the printer says that the sheet is done; `watch` is told what is the matter with it, once for
-    /// each change. Nothing that happens here changes that the job was sent.
-    pub fn await_sheet(&self, address: &Address, watch: &mut dyn FnMut(&[String])) -> Sheet {
-        await_sheet(&mut || address.open(), finish::EVERY, watch)
+    /// Waits, without limit, until the printer says that the sheet of this job is done; `watch` is told what is the matter with it,
+    /// once for each change. Nothing that happens here changes that the job was sent.
+    pub fn await_sheet(&self, job: u32, address: &Address, watch: &mut dyn FnMut(&[String])) -> Sheet {
+        let (mut open, mut pause) = (|| self.caller.open(address, None), |time| self.caller.pause(time));
+        await_sheet(job, &mut open, &mut pause, watch)
             .unwrap_or_else(|error| Sheet::Unknown(with_causes(&error)))
     }
 }

@@ -25,11 +25,13 @@ mod raw;
 pub mod store;
 
 use std::borrow::Cow;
+use std::time::Duration;
 
 use protocol::ink::Ink;
 use protocol::link::message::{JobKind, Progress};
 
-use crate::connection::{Address, OpenError};
+use crate::connection::transport::Transport;
+use crate::connection::{Address, OpenError, find};
 use crate::forms::{Checked, Content, streams};
 use crate::ledger::{self, Ledger, PassUse};
 use crate::printers::{Printer, Printers, PrintersError};
@@ -67,6 +69,16 @@ pub trait Caller {
 
     /// Watches the stages in which a job is prepared.
     fn observer(&self) -> &dyn Observer;
+
+    /// Opens a way to the bridge at this address; with its serial number, wherever it is now.
+    fn open(&self, address: &Address, bridge: Option<u64>) -> Result<Box<dyn Transport>, OpenError> {
+        find::open(address, bridge)
+    }
+
+    /// Waits.
+    fn pause(&self, time: Duration) {
+        std::thread::sleep(time);
+    }
 }
 
 /// What happens to a job.
@@ -203,7 +215,9 @@ impl Failure {
     /// Whether it may pass by itself: what is away may come back, and what is in use is free again one day.
     pub fn may_pass(&self) -> bool {
         match self {
-            Failure::Open(error) => !matches!(error, OpenError::Forbidden(_) | OpenError::Several(_)),
+            Failure::Open(error) => {
+                !matches!(error, OpenError::Forbidden(_) | OpenError::Several(_) | OpenError::Twins(_))
+            }
             Failure::Query(error) | Failure::Ask(AskError::Query(error)) => {
                 matches!(error, QueryError::Link(_) | QueryError::NoAnswer | QueryError::JobOpen(_))
             }
@@ -290,8 +304,13 @@ impl<'a> Packed<'a> {
         let (content, bytes) = (job.content, job.content.bytes());
         match streams::of(content, observer).filter(|streams| streams.len() < bytes.len()) {
             Some(streams) => Packed { job, kind: JobKind::Streams, data: streams.into() },
-            None => Packed { job, kind: JobKind::Raw, data: bytes.into() },
+            None => Packed::raw(job),
         }
+    }
+
+    /// The job byte for byte.
+    pub fn raw(job: Job<'a>) -> Packed<'a> {
+        Packed { job, kind: JobKind::Raw, data: job.content.bytes().into() }
     }
 
     /// What people call it.
@@ -341,9 +360,9 @@ pub struct Delivery<'a> {
 }
 
 impl<'a> Delivery<'a> {
-    /// A way for this caller. If what is known of printers is not shared with other users, the caller is told.
+    /// A way for this caller. If what is known of printers is not shared with other users, or cannot be what it is, the caller is told.
     pub fn new(printers: &'a Printers, caller: &'a dyn Caller) -> Delivery<'a> {
-        if let Some(note) = printers.note() {
+        for note in printers.notes() {
             caller.tell(&News::Note(&note));
         }
         Delivery { printers, ledger: Ledger::of(printers), caller }

@@ -16,11 +16,12 @@ impl Delivery<'_> {
     pub fn send_raw(&self, job: Job<'_>, device: &Path) -> Result<bool, Failure> {
         let printer = Printer::Device(device.to_path_buf());
         if let Some(unfinished) = self.printers.unfinished(&printer)?.pop() {
+            let noted = self.printers.noted(Some(&printer))?;
             let owed = ResetOwed { printer: printer.clone(), job: unfinished.job };
             if !self.caller.agrees(&Question::Reset(&owed)) {
                 return Err(Failure::ResetOwed(owed));
             }
-            self.printers.reset(Some(&printer))?;
+            self.printers.reset(&noted)?;
         }
         loop {
             if self.caller.wish() != Wish::GoOn {
@@ -43,7 +44,7 @@ impl Delivery<'_> {
         let (taken, whole) = match &sent {
             Ok(sent) => (sent.taken, sent.whole),
             Err(RawError::Write { taken, .. }) => (*taken, false),
-            Err(RawError::Open { .. }) => (0, false),
+            Err(RawError::Open { .. } | RawError::NoDevice { .. }) => (0, false),
         };
         self.counted(&number, taken as u64, whole);
         if sent.is_ok() || taken == 0 {

@@ -19,8 +19,8 @@ use crate::transit::{self, Event, RunError};
 const BRIDGE: Duration = Duration::from_secs(3);
 
 /// What a bridge has in its flash.
-pub fn shelf(address: &Address) -> Result<Shelf, Failure> {
-    let mut link = address.open()?;
+pub fn shelf(address: &Address, caller: &dyn Caller) -> Result<Shelf, Failure> {
+    let mut link = caller.open(address, None)?;
     Ok(Query::new(&mut *link, BRIDGE)?.shelf(BRIDGE)?)
 }
 
@@ -38,7 +38,7 @@ pub fn fits(shelf: &Shelf, bytes: usize) -> Result<(), Failure> {
 /// Stores a job in the bridge at `address`, and returns the number it was stored under. Nothing is printed.
 pub fn store(packed: &Packed<'_>, address: &Address, caller: &dyn Caller) -> Result<u32, Failure> {
     let (data, observer) = (packed.data(), caller.observer());
-    fits(&shelf(address)?, data.len())?;
+    fits(&shelf(address, caller)?, data.len())?;
     let number = fresh_number(protocol::link::frame::checksum(data), address.to_string().as_bytes());
     // As much of it as the bridge keeps.
     let ends = packed.name().char_indices().map(|(at, letter)| at + letter.len_utf8());
@@ -49,7 +49,8 @@ pub fn store(packed: &Packed<'_>, address: &Address, caller: &dyn Caller) -> Res
     let mut shown = 0;
     let result = transit::run_at(
         &mut session,
-        address,
+        &mut |bridge| caller.open(address, bridge),
+        &mut |time| caller.pause(time),
         &mut |_| Ok::<(), Infallible>(()),
         &mut |event| match event {
             Event::Moved(progress) => {

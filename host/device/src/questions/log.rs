@@ -12,8 +12,8 @@ use serde::Serialize;
 use super::query::{Query, QueryError};
 use crate::connection::printable;
 
-/// The most of a log that is read: a bridge keeps far less, and one that sends without end is not one.
-const MOST: usize = 1 << 20;
+/// The most of a log that is read: a bridge keeps far less, and one may always have more.
+const MOST: usize = 100_000;
 
 /// A log as it came.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -63,10 +63,12 @@ pub enum LogError {
 pub fn read(query: &mut Query<'_>, patience: Duration) -> Result<Raw, QueryError> {
     let mut piece = query.log(0, patience)?;
     let mut raw = Raw { lost: piece.at, bytes: Vec::new() };
+    let mut read = 0;
     loop {
         let next = piece.at.wrapping_add(piece.bytes.len() as u32);
+        read += piece.bytes.len();
         raw.bytes.append(&mut piece.bytes);
-        if next == piece.end || raw.bytes.len() >= MOST {
+        if next == piece.end || read >= MOST {
             return Ok(raw);
         }
         piece = query.log(next, patience)?;

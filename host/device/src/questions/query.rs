@@ -1,7 +1,7 @@
 //! Questions to a bridge, outside of any job: who it is, what it does, how the printer is.
 
 use std::io;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
@@ -434,11 +434,11 @@ fn exchange<T>(
         let length = frame::write(message, &mut room).unwrap_or(0);
         out.extend_from_slice(&room[..length]);
     }
-    let start = Instant::now();
+    let start = link.now();
     let (mut said, mut sent) = (None::<Duration>, out.len());
     let mut buffer = [0; 1024];
     loop {
-        let now = start.elapsed();
+        let now = link.now().saturating_sub(start);
         if now >= patience {
             return Err(QueryError::NoAnswer);
         }

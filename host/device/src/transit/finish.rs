@@ -2,10 +2,12 @@
 //!
 //! Problem: a job is done when the sheet is out, but what the bridge knows is that the last byte has crossed the port;
 //! the printer holds some of it and prints for a while. Method: ask for its status every few seconds, as the vendor's
-//! own monitor does, until it says twice that it neither prints nor holds data. Limits: a port that does not talk back
-//! tells nothing, and that is what is reported; the sheet itself nobody but the user can see.
+//! own monitor does. Its answer lags: an MD-5000 says idle right behind the last byte and then prints for half a minute. So
+//! the sheet is out when the printer was seen at work and has ended, or has been idle for 20 s. Another job that comes meanwhile
+//! makes the answer that one's, and then nothing is known.
+//! Limits: a port that does not talk back tells nothing, and that is what is reported; the sheet itself nobody but the user can see.
+//! A printer that is switched off and on between two questions has lost the sheet and says that it is idle.
 
-use std::thread::sleep;
 use std::time::Duration;
 
 use protocol::link::message::{Ask, Fault};
@@ -16,7 +18,9 @@ use crate::questions::query::{Query, QueryError, Reply};
 use crate::questions::status::Status;
 
 /// Between two questions: the vendor's monitor asks every four seconds.
-pub(crate) const EVERY: Duration = Duration::from_secs(4);
+const EVERY: Duration = Duration::from_secs(4);
+/// So many answers in a row that it is idle are enough where it was never seen printing: 20 s.
+const STILL_IDLE: u32 = 6;
 /// How long the bridge may take to answer for itself.
 const BRIDGE_PATIENCE: Duration = Duration::from_secs(5);
 /// How long it may take to put a question to the printer, and to get the answer.
@@ -50,19 +54,20 @@ fn unknown(why: &str) -> Sheet {
     Sheet::Unknown(why.into())
 }
 
-/// Waits, without limit, until the printer says that it is done, asking every `every`. `watch` is told what is the
+/// Waits, without limit, until the printer says that it is done with this job, asking every few seconds. `watch` is told what is the
 /// matter with the printer, once for each change; nothing when all is well again.
 pub(crate) fn await_sheet(
+    job: u32,
     open: &mut dyn FnMut() -> Result<Box<dyn Transport>, OpenError>,
-    every: Duration,
+    pause: &mut dyn FnMut(Duration),
     watch: &mut dyn FnMut(&[String]),
 ) -> Result<Sheet, FinishError> {
     let mut link = open()?;
     let mut query = Query::new(&mut *link, BRIDGE_PATIENCE)?;
     let mut troubles: Vec<String> = Vec::new();
-    let (mut idle, mut unanswered, mut most) = (0, 0, NEVER);
+    let (mut worked, mut idle, mut unanswered, mut most) = (false, 0, 0, NEVER);
     loop {
-        let (now, said) = match query.printer(Ask::Printer, PRINTER_PATIENCE)? {
+        let (busy, said) = match query.printer(Ask::Printer, PRINTER_PATIENCE)? {
             Reply::OneWay => return Ok(unknown("the printer's port is one-way")),
             Reply::NotNow => return Ok(unknown("the bridge already has another job")),
             Reply::Unsure | Reply::NotAsked => {
@@ -74,11 +79,15 @@ pub(crate) fn await_sheet(
             Reply::Stopped(Fault::BusyTooLong) | Reply::Silent => (None, Vec::new()),
             Reply::Stopped(fault) => (None, vec![super::words::fault(fault, None)]),
             Reply::Bytes(bytes) => match Status::read(&bytes) {
-                Ok(status) => (Some(status.printing || status.holds_data || status.stale), status.errors),
+                Ok(status) => {
+                    let works = status.printing || status.holds_data;
+                    worked |= works;
+                    (Some(works || status.stale), status.errors)
+                }
                 Err(_) => (None, Vec::new()),
             },
         };
-        match now {
+        match busy {
             Some(busy) => {
                 (unanswered, most) = (0, NO_MORE);
                 idle = if busy { 0 } else { idle + 1 };
@@ -90,12 +99,18 @@ pub(crate) fn await_sheet(
             watch(&said);
             troubles = said;
         }
-        if idle == 2 {
-            return Ok(Sheet::Out);
+        if idle >= if worked { 1 } else { STILL_IDLE } {
+            // Asked behind the last answer: a job that came after it changes nothing.
+            let last = query.ask_progress(BRIDGE_PATIENCE)?;
+            return Ok(if last.job == job {
+                Sheet::Out
+            } else {
+                unknown("the bridge has had another job since")
+            });
         }
         if unanswered == most {
             return Ok(unknown("the printer does not answer"));
         }
-        sleep(every);
+        pause(EVERY);
     }
 }

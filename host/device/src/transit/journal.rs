@@ -20,6 +20,7 @@ use serde::{Deserialize, Serialize};
 use super::record::{Phase, Record};
 use crate::forms::PassPlace;
 use files::durable::{self, Access, STAGED};
+use files::scratch::private;
 
 /// Ended jobs whose records are kept.
 const KEPT: usize = 20;
@@ -121,13 +122,14 @@ pub struct NewJob<'a> {
 }
 
 /// A number for a job that no other job of this or another computer has: time, process, content and place say so well enough, and a
-/// bridge that knows the number as another job's refuses it.
+/// bridge that knows the number as another job's refuses it. All are equally long on the link.
 pub fn fresh_number(content: u32, place: &[u8]) -> u32 {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let seed =
         [&now.as_nanos().to_le_bytes()[..], &std::process::id().to_le_bytes(), &content.to_le_bytes(), place]
             .concat();
-    (protocol::link::frame::checksum(&seed) % ALONE).max(1)
+    const LEAST: u32 = 1 << 28;
+    LEAST + protocol::link::frame::checksum(&seed) % (ALONE - LEAST)
 }
 
 impl Journal {
@@ -148,7 +150,7 @@ impl Journal {
 
     /// The journal in this folder, which is made if need be.
     pub fn at(folder: &Path) -> Result<Journal, JournalError> {
-        durable::make_folder(folder).map_err(io_error("make the folder", folder))?;
+        durable::make_folder(folder, Access::Private).map_err(io_error("make the folder", folder))?;
         Ok(Journal { folder: folder.to_path_buf() })
     }
 
@@ -160,8 +162,7 @@ impl Journal {
     /// Queues a job under a new number. When this returns the job is on disk.
     pub fn queue(&self, job: NewJob<'_>) -> Result<OpenJob, JournalError> {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        let staged = tempfile::Builder::new()
-            .prefix(STAGED)
+        let staged = private(tempfile::Builder::new().prefix(STAGED))
             .tempdir_in(&self.folder)
             .map_err(io_error("write in", &self.folder))?;
         let checksum = checksum(job.data);
@@ -264,6 +265,11 @@ fn is_number(name: &str) -> bool {
 }
 
 impl OpenJob {
+    /// Where its data are on disk until it has ended.
+    pub fn place(&self) -> PathBuf {
+        self.folder.join("data")
+    }
+
     /// Makes the record durable; with the job's end its data go.
     pub fn save(&mut self, record: &Record) -> Result<(), JournalError> {
         self.entry.record = *record;

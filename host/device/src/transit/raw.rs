@@ -30,6 +30,12 @@ pub enum RawError {
         #[source]
         source: io::Error,
     },
+    /// It is a file, which this would write over.
+    #[error("{} is a file and no device; `file:{}` writes a job into a file", path.display(), path.display())]
+    NoDevice {
+        /// The file.
+        path: PathBuf,
+    },
     /// It failed in the middle.
     #[error(
         "{} failed after {taken} of {length} bytes; the sheet is lost. Switch the printer off and on before the next job",
@@ -59,7 +65,11 @@ pub(crate) struct Sent {
 
 fn open(path: &Path) -> Result<File, RawError> {
     let cannot = |source| RawError::Open { path: path.to_path_buf(), source };
-    OpenOptions::new().write(true).open(path).map_err(cannot)
+    let device = OpenOptions::new().write(true).open(path).map_err(cannot)?;
+    match device.metadata().map_err(cannot)?.is_file() {
+        true => Err(RawError::NoDevice { path: path.to_path_buf() }),
+        false => Ok(device),
+    }
 }
 
 /// Whether the device can be opened now.
@@ -169,5 +179,11 @@ mod tests {
         assert!(matches!(error, RawError::Write { taken: 0, length: 10, .. }), "{error}");
         let error = try_open(Path::new("/no/such/device")).unwrap_err();
         assert!(matches!(error, RawError::Open { .. }));
+        // What a file holds stays there.
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), "precious").unwrap();
+        let error = send_while(&[0; 10], file.path(), &Silent, &|| false).unwrap_err();
+        assert!(matches!(error, RawError::NoDevice { .. }), "{error}");
+        assert_eq!(std::fs::read(file.path()).unwrap(), b"precious");
     }
 }

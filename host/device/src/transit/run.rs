@@ -4,13 +4,13 @@
 //! likes: it prints what it holds, and the job goes on where it stands when the cable is back.
 
 use std::cell::Cell;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use protocol::link::message::{Fault, Progress};
 
 use super::session::{Outcome, Record, Session, SessionError};
 use crate::connection::transport::Transport;
-use crate::connection::{Address, Bridge, OpenError, find};
+use crate::connection::{Bridge, OpenError};
 use observe::with_causes;
 
 /// How long to wait for bytes when there is nothing to send.
@@ -75,7 +75,7 @@ fn rubbish(bytes: usize) -> String {
 
 /// Sends a job, or brings it to its end, until the bridge says how it ended.
 ///
-/// `open` opens the link anew each time; `save` makes the record durable. Only the time between two calls of the
+/// `ways` opens the link anew each time; `save` makes the record durable. Only the time between two calls of the
 /// system decides what happens when; which bytes reach the printer does not depend on it.
 pub fn run<E: std::error::Error>(
     session: &mut Session<'_>,
@@ -83,35 +83,36 @@ pub fn run<E: std::error::Error>(
     save: &mut dyn FnMut(&Record) -> Result<(), E>,
     watch: &mut dyn FnMut(Event<'_>),
 ) -> Result<Outcome, RunError<E>> {
-    run_while(session, open, save, watch, &mut || Wish::GoOn)
+    run_while(session, open, &mut std::thread::sleep, save, watch, &mut || Wish::GoOn)
 }
 
-/// Like [`run`]; `wish` is asked again and again what the caller wants.
+/// Like [`run`]; `pause` waits between two attempts to open the link, `wish` is asked again and again what the caller wants.
 pub fn run_while<E: std::error::Error>(
     session: &mut Session<'_>,
     open: &mut dyn FnMut() -> Result<Box<dyn Transport>, OpenError>,
+    pause: &mut dyn FnMut(Duration),
     save: &mut dyn FnMut(&Record) -> Result<(), E>,
     watch: &mut dyn FnMut(Event<'_>),
     wish: &mut dyn FnMut() -> Wish,
 ) -> Result<Outcome, RunError<E>> {
-    let start = Instant::now();
     let mut met = false;
     loop {
-        let link = if met { reopen(open, watch, wish).ok_or(RunError::Left)? } else { open()? };
-        session.connected(start.elapsed());
-        match converse(session, link, start, save, watch, wish, &mut met)? {
+        let link = if met { reopen(open, pause, watch, wish).ok_or(RunError::Left)? } else { open()? };
+        session.connected(link.now());
+        match converse(session, link, save, watch, wish, &mut met)? {
             Some(outcome) => return Ok(outcome),
-            None if met => std::thread::sleep(REOPEN),
+            None if met => pause(REOPEN),
             None => return Err(RunError::NoAnswer(0)),
         }
     }
 }
 
-/// [`run_while`] with the bridge at an address. Once a bridge has introduced itself it is that one, whatever its port is
-/// called when it comes back.
+/// [`run_while`] with a bridge that has a number. Once one has introduced itself it is that one, whatever its port is called
+/// when it comes back: `open` is told its number.
 pub fn run_at<E: std::error::Error>(
     session: &mut Session<'_>,
-    address: &Address,
+    open: &mut dyn FnMut(Option<u64>) -> Result<Box<dyn Transport>, OpenError>,
+    pause: &mut dyn FnMut(Duration),
     save: &mut dyn FnMut(&Record) -> Result<(), E>,
     watch: &mut dyn FnMut(Event<'_>),
     wish: &mut dyn FnMut() -> Wish,
@@ -123,12 +124,13 @@ pub fn run_at<E: std::error::Error>(
         }
         watch(event);
     };
-    run_while(session, &mut || find::open(address, known.get()), save, &mut watch, wish)
+    run_while(session, &mut || open(known.get()), pause, save, &mut watch, wish)
 }
 
 /// Opens the link again, however long that takes; `None` when the caller wishes to be let go.
 fn reopen(
     open: &mut dyn FnMut() -> Result<Box<dyn Transport>, OpenError>,
+    pause: &mut dyn FnMut(Duration),
     watch: &mut dyn FnMut(Event<'_>),
     wish: &mut dyn FnMut() -> Wish,
 ) -> Option<Box<dyn Transport>> {
@@ -143,7 +145,7 @@ fn reopen(
                     watch(Event::Away(&text));
                     told = text;
                 }
-                std::thread::sleep(REOPEN);
+                pause(REOPEN);
             }
         }
     }
@@ -153,13 +155,12 @@ fn reopen(
 fn converse<E: std::error::Error>(
     session: &mut Session<'_>,
     mut link: Box<dyn Transport>,
-    start: Instant,
     save: &mut dyn FnMut(&Record) -> Result<(), E>,
     watch: &mut dyn FnMut(Event<'_>),
     wish: &mut dyn FnMut() -> Wish,
     met: &mut bool,
 ) -> Result<Option<Outcome>, RunError<E>> {
-    let opened = start.elapsed();
+    let opened = link.now();
     let mut out = Vec::new();
     let mut sent = 0;
     let mut buffer = [0; 4096];
@@ -168,7 +169,7 @@ fn converse<E: std::error::Error>(
     let mut last = session.progress().copied();
     let (mut saved, mut saved_at) = (session.record().printed, opened);
     loop {
-        let now = start.elapsed();
+        let now = link.now();
         match wish() {
             Wish::Cancel if !session.record().cancel => session.cancel(),
             Wish::Leave => return Err(RunError::Left),
@@ -201,7 +202,7 @@ fn converse<E: std::error::Error>(
                 return Ok(None);
             }
         };
-        let now = start.elapsed();
+        let now = link.now();
         received += count;
         session.hear(now, &buffer[..count])?;
         if session.greeted()

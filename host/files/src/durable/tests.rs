@@ -375,8 +375,11 @@ fn who_may_read_a_file_does_not_depend_on_what_was_there() {
     use std::os::unix::fs::PermissionsExt as _;
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a/b/file");
-    make_folder(path.parent().unwrap()).unwrap();
-    make_folder(path.parent().unwrap()).unwrap();
+    make_folder(path.parent().unwrap(), Access::Private).unwrap();
+    make_folder(path.parent().unwrap(), Access::Everyone).unwrap();
+    for made in ["a", "a/b"] {
+        assert_eq!(fs::metadata(folder.path().join(made)).unwrap().permissions().mode() & 0o7777, 0o700);
+    }
     for access in [Access::Everyone, Access::Private, Access::Program, Access::Everyone] {
         write(&path, NEW, access).unwrap();
         assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o7777, access.mode());

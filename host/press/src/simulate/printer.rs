@@ -66,6 +66,10 @@ pub struct Printer {
     job: Option<Job>,
     finished: Option<Printout>,
     answers: Vec<u8>,
+    /// So many answers behind a sheet say that it idles, and so many then that it prints.
+    lag: [u32; 2],
+    /// What is left of them.
+    lagging: [u32; 2],
 }
 
 /// What the bytes at a command boundary are.
@@ -93,7 +97,15 @@ impl Printer {
             job: None,
             finished: None,
             answers: Vec::new(),
+            lag: [0; 2],
+            lagging: [0; 2],
         }
+    }
+
+    /// The same with a status that lags, as that of an MD-5000 does: behind each sheet so many answers say that it idles, and so
+    /// many then that it prints.
+    pub fn lagging(self, idle: u32, printing: u32) -> Printer {
+        Printer { lag: [idle, printing], ..self }
     }
 
     /// Takes bytes in pieces of any size and returns how many it took: not all of them if it waits for the operator.
@@ -192,6 +204,9 @@ impl Printer {
         let length = match next {
             Next::Ask => {
                 let status = self.status();
+                if let Some(left) = self.lagging.iter_mut().find(|left| **left > 0) {
+                    *left -= 1;
+                }
                 self.answers.extend_from_slice(&status);
                 ASK.len()
             }
@@ -356,7 +371,8 @@ impl Printer {
 
     /// The status answer at this moment. In trouble, the cartridge entries are those from before.
     pub fn status(&self) -> [u8; STATUS_LENGTH] {
-        let activity = if self.job.is_some() {
+        let prints = self.lagging[0] == 0 && self.lagging[1] > 0;
+        let activity = if self.job.is_some() || prints {
             Activity::Printing
         } else if self.finished.is_some() || !(self.order.is_idle() || self.order.is_complete()) {
             Activity::Buffered
@@ -439,6 +455,7 @@ impl Printer {
         self.abandon();
         self.offset = 0;
         self.answers.clear();
+        self.lagging = [0; 2];
     }
 
     fn abandon(&mut self) {
@@ -452,6 +469,9 @@ impl Printer {
     pub fn take_printout(&mut self) -> Option<Printout> {
         if self.finished.as_ref().is_some_and(|printout| printout.complete) && !self.order.is_complete() {
             return None;
+        }
+        if self.finished.is_some() {
+            self.lagging = self.lag;
         }
         self.finished.take()
     }

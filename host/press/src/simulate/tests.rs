@@ -258,6 +258,18 @@ fn questions_are_answered_between_jobs_and_refused_within() {
 }
 
 #[test]
+fn the_status_lags_behind_a_sheet_as_it_is_told_to() {
+    let mut printer = loaded(&ALL_THREE).lagging(2, 3);
+    printer.feed(&job(SMALL, &three())).unwrap();
+    assert!(printer.take_printout().is_some());
+    let said = [(); 7].map(|()| {
+        printer.feed(&[0x05, 0x01]).unwrap();
+        printer.answers()[4]
+    });
+    assert_eq!(said, [0, 0, 9, 9, 9, 0, 0]);
+}
+
+#[test]
 fn a_second_job_waits_until_the_sheet_is_taken() {
     let job = job(SMALL, &three());
     let mut printer = loaded(&ALL_THREE);

@@ -20,7 +20,7 @@ use observe::Observer;
     foilpress send job.rgl --to serial:/dev/ttyACM0      (a bridge; `foilpress bridge list` finds it)\n  \
     foilpress send job.rgl --to usb: --store             (into the bridge, for its button)\n  \
     foilpress send job.rgl --to raw:/dev/usb/lp0         (a printer on a USB-to-parallel cable)\n\n\
-    A job sent to a bridge is kept on disk until it is printed. After a pulled cable it continues by itself; after any \
+    A job sent to a bridge is kept on disk until it is printed. If the link is lost it continues by itself; after any \
     other interruption `foilpress resume` continues it. A raw device cannot report what it has printed, so a job sent to \
     one cannot be resumed.")]
 pub struct Args {

@@ -120,13 +120,14 @@ pub fn store(job: Job<'_>, to: &Destination, observer: &dyn Observer) -> Result<
     let Destination::Bridge(address) = to else {
         bail!("--store needs a bridge as the destination: usb:, serial:PORT or tcp:HOST:PORT");
     };
+    let terminal = Terminal::new(false, true, observer);
     // Before the job is coded: a mistyped address is told at once.
-    let shelf = device::deliver::store::shelf(address).map_err(|failure| not_stored(job.name, failure))?;
+    let shelf =
+        device::deliver::store::shelf(address, &terminal).map_err(|failure| not_stored(job.name, failure))?;
     let packed = Packed::new(job, observer);
     let size = size_text(packed.kind(), packed.data().len() as u64, job.content.bytes().len() as u64);
     let stored = shelf_text(&shelf).unwrap_or_else(|| "no room for jobs".into());
     observer.note(&format!("{}: {size}; the bridge has {stored}", job.name));
-    let terminal = Terminal::new(false, true, observer);
     output::say_on_interrupt("what is stored of the job does not count; store it again");
     let number = device::deliver::store::store(&packed, address, &terminal)
         .map_err(|failure| not_stored(job.name, failure))?;
@@ -187,11 +188,11 @@ fn to_bridge(job: Job<'_>, address: &Address, order: Order, observer: &dyn Obser
         queue.push(delivery.queue(&journal, &packed.named(&copy_name(job.name, copy, copies)), address)?);
     }
     for (copy, queued) in (1..).zip(queue) {
-        let kept = kept(&queued);
+        let kept = kept(&queued, address);
         let ended = delivery
             .send(&journal, queued, address, met.take(), false)
             .map_err(|failure| advised(failure, Some(address)))
-            .with_context(|| kept)?;
+            .with_context(kept)?;
         finish(&delivery, &ended, address, false, observer)?;
         if copy < copies && !next_sheet(copy, copies)? {
             bail!("{copy} of {copies} sheets are sent; `foilpress resume` sends the next one");
@@ -212,11 +213,11 @@ pub fn go_on(
     // Whether the device is the right one was settled when the job was queued; that it is not is told all the same.
     let terminal = Terminal::new(true, cancel, observer);
     let delivery = Delivery::new(&printers, &terminal);
-    let kept = kept(&job);
+    let kept = kept(&job, address);
     let ended = delivery
         .send(journal, job, address, None, cancel)
         .map_err(|failure| advised(failure, Some(address)))
-        .with_context(|| kept)?;
+        .with_context(kept)?;
     finish(&delivery, &ended, address, cancel, observer)
 }
 
@@ -233,7 +234,7 @@ fn finish(
         Outcome::Printed if cancel => bail!("{text}; it was too late to cancel"),
         Outcome::Printed => {
             observer.note(&text);
-            await_sheet(delivery, &ended.entry.name, address, observer);
+            await_sheet(delivery, ended, address, observer);
             Ok(())
         }
         Outcome::Cancelled if cancel => {
@@ -247,13 +248,14 @@ fn finish(
 }
 
 /// Says when the sheet is out, or why that cannot be said. Nothing that happens here changes that the job was sent.
-fn await_sheet(delivery: &Delivery<'_>, name: &str, address: &Address, observer: &dyn Observer) {
+fn await_sheet(delivery: &Delivery<'_>, ended: &Ended, address: &Address, observer: &dyn Observer) {
+    let name = &ended.entry.name;
     output::say_on_interrupt("the printer has the whole job and continues without this program");
     let mut watch = |troubles: &[String]| match troubles {
         [] => observer.note("the printer continues"),
         troubles => observer.note(&format!("the printer waits: {}", troubles.join("; "))),
     };
-    match delivery.await_sheet(address, &mut watch) {
+    match delivery.await_sheet(ended.entry.record.job, address, &mut watch) {
         Sheet::Out => {
             observer.note(&format!("{name}: printed; the printer says it is done, and the sheet is out"));
         }
@@ -263,10 +265,18 @@ fn await_sheet(delivery: &Delivery<'_>, name: &str, address: &Address, observer:
     }
 }
 
-/// What becomes of a job that is on disk when sending it fails.
-fn kept(job: &OpenJob) -> String {
-    let (number, name) = (job.entry.record.job, &job.entry.name);
-    format!("job {number:08x} ({name}) is kept; `foilpress resume {number:08x}` continues it")
+/// What becomes of a job that is on disk when sending it fails; if it is on disk then.
+fn kept(job: &OpenJob, address: &Address) -> impl FnOnce() -> String + use<> {
+    let (number, name, data) = (job.entry.record.job, job.entry.name.clone(), job.place());
+    let address = address.to_string();
+    move || match data.exists() {
+        true => format!("job {number:08x} ({name}) is kept; `foilpress resume {number:08x}` continues it"),
+        false => format!(
+            "job {number:08x} ({name}) is lost: somebody has removed {}; `foilpress cancel {number:08x} --to {address}` ends what \
+             the bridge has of it",
+            data.display()
+        ),
+    }
 }
 
 /// A failure before anything was queued.

@@ -238,7 +238,7 @@ impl<W: Write + Send> Caller for System<'_, W> {
 /// Makes an empty file, durably, for this user alone.
 pub(super) fn put(path: &Path) -> io::Result<()> {
     if let Some(folder) = path.parent() {
-        durable::make_folder(folder)?;
+        durable::make_folder(folder, Access::Private)?;
     }
     durable::write(path, &[], Access::Private)
 }

@@ -51,7 +51,7 @@ impl Bench {
     fn new(cartridges: &[Cartridge]) -> Option<Bench> {
         let (image, program) = parts()?;
         let folder = tempfile::tempdir().unwrap();
-        let printer = Printer::new(Carousel::new(cartridges).unwrap(), Lever::Auto);
+        let printer = Printer::new(Carousel::new(cartridges).unwrap(), Lever::Auto).lagging(1, 1);
         let scripts = Path::new(env!("CARGO_MANIFEST_DIR")).join("emulator");
         let ends = folder.path().join("bridge");
         fs::create_dir(&ends).unwrap();

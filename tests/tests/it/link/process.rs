@@ -23,7 +23,7 @@ use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::Ordering;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use testing::program::path as program;
 
 /// Says in the child what it is to send.
@@ -197,6 +197,17 @@ fn the_program_sends_pass_streams_and_waits_for_the_sheet() {
 }
 
 #[test]
+fn a_sheet_is_out_when_the_printer_was_seen_printing_and_has_ended() {
+    let bench = Bench::new(8, 1000);
+    // It says idle where it is asked first, prints where it is asked next, and is idle again.
+    bench.bridge.port.lag.store(3600, Ordering::Relaxed);
+    let start = Instant::now();
+    let said = bench.says(0, "send job.rgl --to BRIDGE");
+    assert!(said.contains("the sheet is out"), "{said}");
+    assert!(start.elapsed() >= Duration::from_millis(4600), "before it was: {said}");
+}
+
+#[test]
 fn a_bridge_without_memory_for_the_page_gets_the_job_as_it_is() {
     let bench = Bench::with(random_job(8), Port::new(&[Ink::White], 1000).with_band(100));
     let said = bench.says(0, "send job.rgl --to BRIDGE");
@@ -225,6 +236,46 @@ fn after_a_bridge_has_forgotten_nothing_is_sent_before_the_printer_was_reset() {
     bench.keep_busy(false);
     bench.says(0, "send job.rgl --to BRIDGE");
     assert!(bench.printed()[printed.len()..] == bench.job, "other bytes at the port");
+}
+
+#[test]
+fn pulled_data_lines_cost_nothing_and_a_pulled_supply_costs_the_sheet_and_says_so() {
+    for all in [false, true] {
+        let bench = Bench::new(8, 100);
+        bench.keep_busy(true);
+        let mut child = bench.program("send job.rgl --to BRIDGE").spawn().unwrap();
+        bench.until_it_prints();
+        bench.bridge.port.cut.store(true, Ordering::Relaxed);
+        bench.bridge.port.forget.store(all, Ordering::Relaxed);
+        std::thread::sleep(Duration::from_millis(300));
+        bench.keep_busy(false);
+        let mut said = String::new();
+        child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+        let code = child.wait().unwrap().code();
+        let printed = bench.printed();
+        if all {
+            assert!(code == Some(1) && said.contains("no longer knows this job"), "{said}");
+            assert!(printed.len() < bench.job.len() && bench.job.starts_with(&printed), "printed twice");
+        } else {
+            assert!(code == Some(0) && printed == bench.job, "{said}");
+        }
+    }
+}
+
+#[test]
+fn a_job_whose_folder_somebody_removes_is_told_as_lost_and_can_be_ended() {
+    let bench = Bench::new(8, 100);
+    bench.keep_busy(true);
+    let mut child = bench.program("send job.rgl --to BRIDGE").spawn().unwrap();
+    bench.until_it_prints();
+    let number = Journal::at(&bench.jobs()).unwrap().entries().unwrap()[0].record.job;
+    std::fs::remove_dir_all(bench.jobs()).unwrap();
+    bench.keep_busy(false);
+    let mut said = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(1), "{said}");
+    assert!(said.contains("is lost: somebody has removed") && !said.contains("is kept"), "{said}");
+    assert!(said.contains(&format!("foilpress cancel {number:08x} --to unix:")), "{said}");
 }
 
 #[test]

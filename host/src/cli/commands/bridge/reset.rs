@@ -25,7 +25,7 @@ use device::questions::query::Query;
     foilpress bridge reset --to serial:/dev/ttyACM0\n  \
     foilpress bridge reset --yes                  (also if a job is open: its sheet is lost)\n  \
     foilpress bridge reset --by-hand              (the printer has been switched off and on)\n\n\
-    A bridge that has lost its memory in the middle of a sheet does not reset the printer by itself. If a job is open, whoever \
+    A bridge that has lost its memory in the middle of a job of this program does not reset the printer by itself. If a job is open, whoever \
     has sent it, the command asks first: the job is given up, and its sheet is lost. It is not known for certain what a printer does with a sheet it holds; if the sheet does not come \
     out, switch the printer off and on.")]
 pub struct Args {
@@ -44,7 +44,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<()> {
     let printers = Printers::of_system()?;
     if args.by_hand {
-        return Ok(printers.reset(None)?);
+        return Ok(printers.reset(&printers.noted(None)?)?);
     }
     let address = named_or_only(args.to.as_ref())?;
     let mut link = address.open()?;

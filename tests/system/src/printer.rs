@@ -1,0 +1,60 @@
+//! The printer: what has crossed its port since it last stood between two jobs, and what it says of itself.
+//!
+//! Its status lags: it says idle for seconds behind the last byte of a sheet, and then prints for half a minute (as the MD-5000
+//! does on a parallel port). A sheet that comes while another one waits or is printed follows that one at once. Time is in µs.
+
+use model::is_a_whole_job;
+
+/// The printer.
+pub struct Printer {
+    /// Bytes since it stood between two jobs; with a part of a sheet it waits for the rest.
+    pub since: Vec<u8>,
+    /// The job whose bytes these are, as the bridge numbers it.
+    pub owner: u32,
+    /// It is without supply until then.
+    pub off_until: u64,
+    /// It is out of paper until then.
+    pub paper_out_until: u64,
+    /// From when until when it prints what has come whole.
+    prints: (u64, u64),
+    /// How long its status says idle behind a sheet, and for how long it then prints.
+    lag: (u64, u64),
+}
+
+impl Printer {
+    /// A printer between two jobs, with this lag.
+    pub fn new(lag: (u64, u64)) -> Printer {
+        Printer { since: Vec::new(), owner: 0, off_until: 0, paper_out_until: 0, prints: (0, 0), lag }
+    }
+
+    /// Whether it waits for the rest of a sheet.
+    pub fn holds_a_part(&self) -> bool {
+        !self.since.is_empty() && !is_a_whole_job(&self.since)
+    }
+
+    /// It was reset, or switched off: gives the part of a sheet that is lost with that.
+    pub fn reset(&mut self) -> Option<(u32, Vec<u8>)> {
+        let part = self.holds_a_part();
+        let since = std::mem::take(&mut self.since);
+        part.then_some((self.owner, since))
+    }
+
+    /// A whole sheet has come: when it will be out.
+    pub fn whole(&mut self, now: u64) -> u64 {
+        self.since.clear();
+        let (from, until) = self.prints;
+        let from = if now < until { from } else { now + self.lag.0 };
+        self.prints = (from, until.max(from) + self.lag.1);
+        self.prints.1
+    }
+
+    /// Its answer to the status question.
+    pub fn status(&self, now: u64) -> [u8; 38] {
+        let prints = (self.prints.0..self.prints.1).contains(&now);
+        let mut answer = [0xff; 38];
+        answer[..5].copy_from_slice(&[2, 0x80, 33, 0, if prints { 0x18 } else { 0x10 }]);
+        answer[32..37].fill(0);
+        answer[37] = 3;
+        answer
+    }
+}

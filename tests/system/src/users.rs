@@ -1,0 +1,385 @@
+//! Users and their processes: the program's own delivery, journal and notes, on a folder of this computer.
+//!
+//! A process runs until it ends, is killed, or its user leaves. While it waits the other user may run one of his own, which ends
+//! before the first one goes on. A process that is killed unwinds without a word; what it has on disk stays as it is. Where the test
+//! may choose whom it is (root on Linux), each user has a number of his own, so that the sticky folder keeps them apart.
+
+use crate::chance::{Draw, Kind};
+use crate::pool;
+use crate::promises::Promise;
+use crate::world::{Shared, USERS};
+use device::connection::transport::Transport;
+use device::connection::{Address, OpenError};
+use device::deliver::{self, Caller, Delivery, Failure, News, Question, store};
+use device::printers::Printers;
+use device::questions::query::Query;
+use device::transit::Wish;
+use device::transit::finish::Sheet;
+use device::transit::journal::{Journal, fresh_number};
+use device::transit::session::{Outcome, Phase};
+use observe::{Observer, Silent};
+use protocol::link::message::{JobState, Progress};
+use std::cell::{Cell, RefCell};
+use std::fs;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// A process was killed.
+struct Killed;
+
+/// How long a bridge may take to answer.
+const BRIDGE: Duration = Duration::from_secs(3);
+
+/// The numbers of the users, and of one who may not open the bridge.
+#[cfg(target_os = "linux")]
+const NUMBERS: [u32; USERS + 1] = [10_001, 10_002, 10_003];
+
+/// Ends this user's process if it was killed.
+pub fn live(world: &Shared, user: usize) {
+    if world.look().doomed[user] {
+        resume_unwind(Box::new(Killed));
+    }
+}
+
+/// Whether the test may choose who it is.
+pub fn can_be_others() -> bool {
+    #[cfg(target_os = "linux")]
+    return rustix::process::getuid().is_root();
+    #[cfg(not(target_os = "linux"))]
+    false
+}
+
+/// The process of this thread belongs to a user from now on, or to the test again.
+fn become_user(user: Option<usize>) {
+    #[cfg(target_os = "linux")]
+    if can_be_others() {
+        use rustix::thread::set_thread_res_uid;
+        let root = rustix::process::Uid::ROOT;
+        let number = user.map_or(root, |user| rustix::process::Uid::from_raw(NUMBERS[user]));
+        // From one user to another the way leads over root.
+        set_thread_res_uid(root, root, root).expect("root may");
+        set_thread_res_uid(root, number, root).expect("root may");
+    }
+    let _ = user;
+}
+
+/// A file that the test has written belongs to the user who may not open the bridge.
+pub fn give_to_stranger(path: &Path) {
+    #[cfg(target_os = "linux")]
+    if can_be_others() {
+        let before = rustix::process::geteuid().as_raw();
+        become_user(None);
+        std::os::unix::fs::lchown(path, Some(NUMBERS[USERS]), None).expect("root may");
+        become_user(NUMBERS.iter().position(|&number| number == before));
+    }
+    let _ = path;
+}
+
+/// The folders of a world.
+pub fn furnish(folder: &Path) -> PathBuf {
+    let notes = folder.join("notes");
+    fs::create_dir(&notes).expect("a folder of our own");
+    for user in 0..USERS {
+        fs::create_dir(home(&notes, user)).expect("a folder of our own");
+    }
+    #[cfg(target_os = "linux")]
+    if can_be_others() {
+        use std::os::unix::fs::{PermissionsExt as _, chown};
+        fs::set_permissions(folder, fs::Permissions::from_mode(0o755)).expect("ours");
+        fs::set_permissions(&notes, fs::Permissions::from_mode(0o1777)).expect("ours");
+        for (user, &number) in NUMBERS[..USERS].iter().enumerate() {
+            chown(home(&notes, user), Some(number), None).expect("root may");
+        }
+    }
+    notes
+}
+
+fn home(notes: &Path, user: usize) -> PathBuf {
+    notes.with_file_name(format!("jobs-{user}"))
+}
+
+fn address() -> Address {
+    Address::Serial("bridge".into())
+}
+
+/// Whoever sits before a process.
+struct Person<'w> {
+    world: &'w Shared,
+    user: usize,
+    /// What the job prints that is queued next, and its last number.
+    which: Cell<usize>,
+    number: Cell<Option<u32>>,
+    /// Times the bridge was away.
+    waited: Cell<u32>,
+    wish: Cell<Wish>,
+    /// Nothing is refused any more, and nobody leaves.
+    calm: bool,
+    said: RefCell<Draw>,
+}
+
+impl Caller for Person<'_> {
+    fn tell(&self, news: &News<'_>) {
+        live(self.world, self.user);
+        if let News::Queued { entry, .. } = news {
+            self.number.set(Some(entry.record.job));
+            self.world.look().meet(entry.record.job, self.which.get(), self.user, false);
+        }
+    }
+
+    fn agrees(&self, _question: &Question<'_>) -> bool {
+        self.calm || self.said.borrow_mut().one_in_1000(700)
+    }
+
+    fn waits(&self, _obstacle: &Failure, _begun: bool) -> bool {
+        self.waited.set(self.waited.get() + 1);
+        self.world.pause(self.user, Duration::from_secs(1));
+        self.waited.get() < if self.calm { 30 } else { 10 }
+    }
+
+    fn wish(&self) -> Wish {
+        let mut world = self.world.look();
+        if self.wish.get() == Wish::GoOn {
+            if world.chance.happens(Kind::Cancel).is_some() {
+                self.wish.set(Wish::Cancel);
+            } else if world.chance.happens(Kind::Leave).is_some() {
+                self.wish.set(Wish::Leave);
+            }
+        }
+        if self.wish.get() == Wish::Cancel
+            && let Some(known) = self.number.get().and_then(|number| world.known.get_mut(&number))
+        {
+            known.cancelled = true;
+        }
+        self.wish.get()
+    }
+
+    fn observer(&self) -> &dyn Observer {
+        &Silent
+    }
+
+    fn open(&self, address: &Address, _bridge: Option<u64>) -> Result<Box<dyn Transport>, OpenError> {
+        self.world.open(self.user, address)
+    }
+
+    fn pause(&self, time: Duration) {
+        self.world.pause(self.user, time);
+    }
+}
+
+/// A user does something, whatever the numbers say.
+pub fn run(world: &Shared, user: usize, mut draw: Draw) {
+    let what = draw.below(12);
+    process(world, user, draw, false, |person, desk| match what {
+        0..=4 => desk.send(person),
+        5..=7 => desk.resume(person, what == 7),
+        8 => desk.store(person),
+        9 => desk.print_stored(person),
+        10 => desk.delete_stored(person),
+        _ => desk.reset(person),
+    });
+}
+
+/// When all is well again, the users go on by turns until none of their jobs is open: one may wait for another's.
+pub fn finish(world: &Shared) {
+    for _ in 0..40 {
+        let mut open = false;
+        for user in 0..USERS {
+            process(world, user, Draw::new(1), true, |person, desk| {
+                desk.end_orphan(person);
+                open |= desk.unfinished(person).is_some();
+                desk.resume(person, false);
+            });
+        }
+        if !open {
+            return;
+        }
+    }
+    let mut world = world.look();
+    let found = format!("the users have resumed 40 times; {}; {}", world.last_failure, world.standing());
+    world.fail(Promise::EveryJobEnds, found);
+}
+
+/// A process of a user from its beginning to its end.
+fn process(world: &Shared, user: usize, draw: Draw, calm: bool, act: impl FnOnce(&Person<'_>, &Desk<'_>)) {
+    let (notes, before) = {
+        let mut look = world.look();
+        let before = look.runs.iter().position(|runs| *runs);
+        (look.runs[user], look.doomed[user]) = (true, false);
+        (look.notes.clone(), before)
+    };
+    become_user(Some(user));
+    let ended = catch_unwind(AssertUnwindSafe(|| {
+        let person = Person {
+            world,
+            user,
+            which: Cell::new(0),
+            number: Cell::new(None),
+            waited: Cell::new(0),
+            wish: Cell::new(Wish::GoOn),
+            calm,
+            said: RefCell::new(draw),
+        };
+        let printers = Printers::at(&notes).expect("it is there");
+        let journal = Journal::at(&home(&notes, user)).expect("it is there");
+        act(&person, &Desk { printers: &printers, journal: &journal });
+    }));
+    become_user(before);
+    let mut look = world.look();
+    (look.runs[user], look.doomed[user]) = (false, false);
+    drop(look);
+    if let Err(payload) = ended
+        && !payload.is::<Killed>()
+    {
+        resume_unwind(payload);
+    }
+}
+
+/// What a user's processes share.
+struct Desk<'d> {
+    printers: &'d Printers,
+    journal: &'d Journal,
+}
+
+impl Desk<'_> {
+    fn send(&self, person: &Person<'_>) {
+        let which = person.world.look().fresh();
+        person.which.set(which);
+        let delivery = Delivery::new(self.printers, person);
+        let Ok(job) = delivery.queue(self.journal, pool::packed(which), &address()) else { return };
+        let sent = delivery.send(self.journal, job, &address(), None, false);
+        self.judge(person, &delivery, sent.ok().map(|ended| ended.outcome));
+    }
+
+    /// The job of this user that is open for the longest.
+    fn unfinished(&self, person: &Person<'_>) -> Option<u32> {
+        let world = person.world.look();
+        let open: Vec<u32> = self
+            .journal
+            .entries()
+            .unwrap_or_default()
+            .into_iter()
+            .filter(|entry| !matches!(entry.record.phase, Phase::Ended(_)))
+            .map(|entry| entry.record.job)
+            .collect();
+        // The one that the bridge has open goes first: it takes no other.
+        let at_bridge = world.open_job();
+        let order =
+            |number: &u32| (at_bridge != Some(*number), world.known.get(number).map(|known| known.order));
+        open.into_iter().min_by_key(order)
+    }
+
+    fn resume(&self, person: &Person<'_>, cancel: bool) {
+        let Some(number) = self.unfinished(person) else { return };
+        let job = match self.journal.open(number) {
+            Ok(job) => job,
+            Err(error) => {
+                let said = format!("user {}: {}", person.user, observe::with_causes(&error));
+                person.world.look().last_failure = said;
+                return;
+            }
+        };
+        person.number.set(Some(number));
+        {
+            let mut world = person.world.look();
+            let Some(known) = world.known.get_mut(&number) else { return };
+            person.which.set(known.which);
+            known.cancelled |= cancel;
+        }
+        let delivery = Delivery::new(self.printers, person);
+        let sent = delivery.send(self.journal, job, &address(), None, cancel);
+        if let Err(failure) = &sent {
+            person.world.look().last_failure =
+                format!("user {}: {}", person.user, observe::with_causes(failure));
+        }
+        self.judge(person, &delivery, sent.ok().map(|ended| ended.outcome));
+    }
+
+    /// What the program has told, beside what is so.
+    fn judge(&self, person: &Person<'_>, delivery: &Delivery<'_>, outcome: Option<Outcome>) {
+        let (Some(number), Some(outcome)) = (person.number.get(), outcome) else { return };
+        told(person.world, number, outcome);
+        if outcome == Outcome::Printed && person.said.borrow_mut().one_in_1000(300) {
+            let sheet = delivery.await_sheet(number, &address(), &mut |_| {});
+            let mut world = person.world.look();
+            let (now, out_at) = (world.now, world.known.get(&number).map(|known| known.out_at));
+            if sheet == Sheet::Out && out_at > Some(now) {
+                let found = format!("job {number:08x} is said to be out at {now}, and is at {out_at:?}");
+                world.fail(Promise::OutIsOut, found);
+            }
+        }
+    }
+
+    fn store(&self, person: &Person<'_>) {
+        let which = person.world.look().fresh();
+        if let Ok(number) = store::store(pool::packed(which), &address(), person) {
+            person.world.look().shelf.insert(number, which);
+        }
+    }
+
+    fn print_stored(&self, person: &Person<'_>) {
+        let Ok(mut link) = person.open(&address(), None) else { return };
+        let Ok(mut query) = Query::new(&mut *link, BRIDGE) else { return };
+        let Ok(shelf) = query.shelf(BRIDGE) else { return };
+        let Some(stored) = shelf.jobs.get(person.said.borrow_mut().below(shelf.jobs.len())) else { return };
+        let Some(&which) = person.world.look().shelf.get(&stored.job) else { return };
+        let number = fresh_number(stored.job, &person.world.look().step.to_le_bytes());
+        person.world.look().meet(number, which, person.user, true);
+        let mut said = query.print_stored(number, stored.job, BRIDGE).map(|progress| progress.state);
+        while let Ok(JobState::Printing | JobState::Stopped(_) | JobState::Cancelling) = said {
+            person.pause(Duration::from_millis(500));
+            said = query
+                .ask_progress(BRIDGE)
+                .map(|progress| if progress.job == number { progress.state } else { JobState::None });
+        }
+        let outcome = match said {
+            Ok(JobState::Done) => Outcome::Printed,
+            Ok(JobState::Lost) => Outcome::Lost,
+            _ => return,
+        };
+        told(person.world, number, outcome);
+    }
+
+    /// `foilpress cancel --to`: what is half stored, and whose sender was killed, is given up.
+    fn end_orphan(&self, person: &Person<'_>) {
+        let Ok(mut link) = person.open(&address(), None) else { return };
+        let Ok(mut query) = Query::new(&mut *link, BRIDGE) else { return };
+        let Progress { job, state, .. } = *query.progress();
+        if state == JobState::Storing {
+            let _ = query.cancel(job, BRIDGE);
+        }
+    }
+
+    fn delete_stored(&self, person: &Person<'_>) {
+        let Ok(mut link) = person.open(&address(), None) else { return };
+        let Ok(mut query) = Query::new(&mut *link, BRIDGE) else { return };
+        let Ok(shelf) = query.shelf(BRIDGE) else { return };
+        if let Some(stored) = shelf.jobs.first() {
+            let _ = query.delete_stored(stored.job, BRIDGE);
+        }
+    }
+
+    fn reset(&self, person: &Person<'_>) {
+        let Ok(mut link) = person.open(&address(), None) else { return };
+        let Ok(mut query) = Query::new(&mut *link, BRIDGE) else { return };
+        // Whoever resets a bridge that has restarted gives up the job that it would go on with.
+        person.world.look().harmed = true;
+        let _ = deliver::reset(&mut query, self.printers);
+    }
+}
+
+/// What somebody was told of a job, beside what is so.
+pub fn told(world: &Shared, number: u32, outcome: Outcome) {
+    let mut world = world.look();
+    let Some(&known) = world.known.get(&number) else { return };
+    let found = format!("job {number:08x} is told as {outcome:?}; {known:?}");
+    let promise = match outcome {
+        Outcome::Printed if known.whole != 1 => Promise::PrintedIsAtThePrinter,
+        Outcome::Lost | Outcome::Forgotten | Outcome::Broken if !world.harmed && !known.cancelled => {
+            Promise::HarmlessCostsNothing
+        }
+        Outcome::Cancelled if !known.cancelled => Promise::HarmlessCostsNothing,
+        _ => return,
+    };
+    world.fail(promise, found);
+}

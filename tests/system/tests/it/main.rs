@@ -1,0 +1,81 @@
+//! The whole system under a seed that is drawn anew, and under the seeds that once broke a promise.
+
+use std::time::{Duration, Instant};
+use system::{report, run};
+
+/// For how long it is tried on an ordinary day; the gate says for how long then.
+const EVERYDAY_SECONDS: u64 = 10;
+
+/// `FOILPRESS_SEED` and `FOILPRESS_SECONDS` choose what is tried, and for how long.
+fn number(name: &str) -> Option<u64> {
+    std::env::var(name).ok()?.parse().ok()
+}
+
+#[test]
+fn every_promise_is_kept_whatever_happens() {
+    let first = number("FOILPRESS_SEED").unwrap_or_else(|| {
+        let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+        now.as_nanos() as u64 % 1_000_000_007 * 1_000_000
+    });
+    let time = Duration::from_secs(number("FOILPRESS_SECONDS").unwrap_or(EVERYDAY_SECONDS));
+    println!("from seed {first} on, for {time:?}");
+    let start = Instant::now();
+    let (mut steps, mut sheets, mut broken) = (0, 0, Vec::new());
+    for seed in first.. {
+        let found = run(seed, None);
+        (steps, sheets) = (steps + found.steps, sheets + found.sheets);
+        if found.broken.is_some() {
+            println!("after {steps} steps in all, {:?}:\n{}", start.elapsed(), report(seed, &found));
+            broken.push(seed);
+        }
+        if start.elapsed() > time || broken.len() >= 5 {
+            println!("{} seeds, {steps} steps, {sheets} sheets in {:?}", seed - first + 1, start.elapsed());
+            break;
+        }
+    }
+    assert!(broken.is_empty(), "promises were broken under {broken:?}");
+}
+
+/// All sources of tests in a folder.
+fn sources(folder: &std::path::Path, text: &mut String) {
+    for item in std::fs::read_dir(folder).expect("a folder").filter_map(Result::ok) {
+        let (path, name) = (item.path(), item.file_name());
+        let name = name.to_string_lossy();
+        if path.is_dir() {
+            if !matches!(&*name, "target" | "node_modules") && !name.starts_with('.') {
+                sources(&path, text);
+            }
+        } else if name.ends_with(".rs") || name.ends_with(".mjs") {
+            text.push_str(&std::fs::read_to_string(&path).unwrap_or_default());
+        }
+    }
+}
+
+/// The words of a text, one space between them.
+fn words(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn every_promise_of_the_documents_stands_there_and_names_a_test_that_exists() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let table = std::fs::read_to_string(root.join("docs/promises.md")).expect("the table");
+    let mut text = String::new();
+    sources(&root, &mut text);
+    let rows: Vec<&str> = table.lines().filter(|line| line.starts_with("| ")).skip(1).collect();
+    assert!(rows.len() > 10);
+    for row in rows {
+        let mut columns = row.trim_matches(['|', ' ']).split(" | ");
+        let (sentence, place) = (columns.next().expect("a sentence"), columns.next().expect("a place"));
+        let path = place.split_once("](").and_then(|(_, path)| path.strip_suffix(')')).expect("a link");
+        let document = std::fs::read_to_string(root.join("docs").join(path)).expect("a document");
+        assert!(words(&document).contains(&words(sentence)), "{path} does not say: {sentence}");
+        let held = row.trim_end_matches('|').rsplit('|').next().expect("a column");
+        let names: Vec<&str> = held.split('`').skip(1).step_by(2).collect();
+        assert!(!names.is_empty(), "no test: {row}");
+        for name in names {
+            let exists = text.contains(&format!("fn {name}(")) || text.contains(&format!("test('{name}'"));
+            assert!(exists, "no test is called {name}");
+        }
+    }
+}
