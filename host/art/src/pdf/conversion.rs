@@ -201,7 +201,10 @@ mod tests {
                 prop_assert_eq!(ObjectType::of(tag), ObjectType::Drawing);
                 for (found, ink) in rgb.into_iter().zip([c, m, y]) {
                     let wanted = 255.0 * (1.0 - taken(ink) - taken(k)).max(0.0);
-                    prop_assert!((f64::from(found) - wanted).abs() < 12.0, "{found} for {ink} with {k} of K");
+                    // Of what is nearly full, a step of the value is hardly any light.
+                    let dots = (light(f64::from(found) / 255.0) - light(wanted / 255.0)).abs();
+                    let is_right = dots < 0.01 || (f64::from(found) - wanted).abs() < 12.0;
+                    prop_assert!(is_right, "{found} for {ink} with {k} of K");
                 }
             }
         }
