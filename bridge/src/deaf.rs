@@ -3,7 +3,7 @@
 //! Problem: a bus error within a packet to the host can stop the RP2040's controller for good (erratum RP2040-E15, seen behind hubs),
 //! and a USB stack that waits for something else does not look at a bus reset. The board prints on, but no computer finds it until its
 //! supply is taken, which costs the sheet. Method: the controller is looked at every [`LOOK_MS`]. A bus reset that nobody has
-//! served for [`UNSERVED_MS`], and a board that had an address, has lost it by a reset, and gets no other for [`UNADDRESSED_MS`] although
+//! served for a second (`UNSERVED_MS`), and a board that had an address, has lost it by a reset, and gets no other for five (`UNADDRESSED_MS`) although
 //! the host sends its frames, ask for a restart, which keeps a job to the byte.
 //! Cost: a board that a host does not address on purpose restarts once. Limits: whether E15 shows itself like this has been seen
 //! on no board.
