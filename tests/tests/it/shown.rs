@@ -206,9 +206,8 @@ impl Desk {
         for address in ["serial:/dev/ttyACM0", "serial:target/firmware/bridge/tty", "usb:"] {
             command = command.replace(address, &self.address);
         }
-        let device = self.folder.path().join("lp0");
-        fs::write(&device, "").unwrap();
-        command = command.replace("/dev/usb/lp0", &device.display().to_string());
+        // A device that takes everything and answers nothing.
+        command = command.replace("/dev/usb/lp0", "/dev/null");
         // Without an address the program looks for the only bridge on USB.
         let is_of_a_bridge = ["foilpress bridge reset", "foilpress bridge status", "foilpress bridge jobs"]
             .iter()

@@ -170,7 +170,6 @@ mod tests {
             (Box::new(Unsendable::Illegal(stream.clone())), stream.to_string()),
             (Box::new(link()), fire()),
             (Box::new(RawError::Open { path: path(), source: disk() }), fire()),
-            (Box::new(RawError::NoDevice { path: path() }), fire()),
             (Box::new(RawError::Write { path: path(), taken: 1, length: 2, source: disk() }), fire()),
             (Box::new(journal()), fire()),
             (Box::new(PrintersError::Io { what: "write", path: path(), source: disk() }), fire()),
