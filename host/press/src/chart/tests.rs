@@ -278,7 +278,7 @@ fn the_first_sheet_has_four_bars_where_a_ruler_looks_for_them_in_a_job_of_less_t
         };
         assert!(crate::pipeline::job(&request, &Silent).unwrap().bytes.len() < 2000);
     }
-    let small = Paper::Custom { width: 900, length: 4000 };
+    let small = Paper::Custom { width: 500, length: 4000 };
     assert!(matches!(first(Ink::Black, small), Err(ChartError::Paper { chart: "first", .. })));
 }
 
