@@ -66,9 +66,9 @@ impl Engine<'_> {
             ToBridge::Ask { request, what: Ask::Board } => self.due.usage = Some(request),
             ToBridge::Configure(settings) => {
                 // Harmless at any time, and needed most when a job is stuck.
-                self.unless_busy(Task::Configure(settings));
+                self.unless_busy(Task::Configure(settings), None);
             }
-            ToBridge::Initialise => {
+            ToBridge::Initialise { request } => {
                 // A job from before a reset whose data are gone can only be given up.
                 if self.job.as_ref().is_some_and(|job| job.phase == Phase::Unknown) {
                     self.end(JobState::Lost);
@@ -77,13 +77,13 @@ impl Engine<'_> {
                 // One of which nothing has been made for the port yet is printed behind the reset.
                 let untouched = |job: &Job| job.printed == 0 && self.output.is_empty();
                 if self.job.as_ref().is_some_and(untouched) {
-                    self.unless_busy(Task::Initialise);
+                    self.unless_busy(Task::Initialise, Some(request));
                 } else {
-                    self.between_jobs(Task::Initialise);
+                    self.between_jobs(Task::Initialise, Some(request));
                 }
             }
-            ToBridge::Bootloader => self.between_jobs(Task::Bootloader),
-            ToBridge::Drive { data, control } => self.between_jobs(Task::Drive { data, control }),
+            ToBridge::Bootloader => self.between_jobs(Task::Bootloader, None),
+            ToBridge::Drive { data, control } => self.between_jobs(Task::Drive { data, control }, None),
             ToBridge::Probe { request, data, control } => self.ask(request, Task::Probe { data, control }),
             ToBridge::ReadLog { request, from } => self.due.log = Some((request, from)),
             ToBridge::Abandon { job } => self.abandon(job),
@@ -312,16 +312,16 @@ impl Engine<'_> {
         }
     }
 
-    fn between_jobs(&mut self, task: Task) {
+    fn between_jobs(&mut self, task: Task, request: Option<u16>) {
         match &self.job {
             Some(job) => self.refuse(Refusal::JobOpen, job.id),
-            None => self.unless_busy(task),
+            None => self.unless_busy(task, request),
         }
     }
 
     /// Assigns a task. A board that has one refuses it as it would beside a job: the host may ask again later.
-    fn unless_busy(&mut self, task: Task) {
-        if !self.assign(task, None) {
+    fn unless_busy(&mut self, task: Task, request: Option<u16>) {
+        if !self.assign(task, request) {
             self.refuse(Refusal::JobOpen, self.job.as_ref().map_or(0, |job| job.id));
         }
     }

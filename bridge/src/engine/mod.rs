@@ -458,6 +458,7 @@ impl<'m> Engine<'m> {
             (Outcome::Lines(lines), Some(request)) => {
                 self.prepare(&ToHost::Lines { request, lines, fault: lines.fault() });
             }
+            (Outcome::Done, Some(request)) => self.due.lines = Some(request),
             (Outcome::Done | Outcome::Answer(_) | Outcome::Lines(_), _) => {}
         }
         self.reset_if_owed();

@@ -37,9 +37,10 @@ impl Engine<'_> {
             return true;
         }
         // Only whole commands go out, and none before the first row, so that the printer is not inside one wherever the
-        // job ends. A command longer than the queue has to go in pieces all the same.
+        // job ends, and gets nothing of one that breaks off before. A command longer than the queue has to go in pieces all the
+        // same.
         let complete = job.accepted == job.length;
-        let held = !complete && !self.ahead.has_rows();
+        let held = !self.ahead.has_rows() && (!complete || self.ahead.is_open());
         let stuck = self.data.free() == 0 && (held || job.settled <= job.used);
         let until = if stuck || self.ahead.is_foreign() {
             job.accepted

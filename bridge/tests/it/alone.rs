@@ -280,7 +280,7 @@ fn a_thousand_cuts_cost_nothing_but_the_sheet_in_the_rollers() {
             let lost = printer.lost.len();
             if deed == Deed::Link && !printer.since.is_empty() {
                 // The host of that job remembers it, and has the printer reset.
-                again.tell(ToBridge::Initialise);
+                again.tell(ToBridge::Initialise { request: 7 });
             }
             for _ in 0..4 {
                 while again.alone.poll(&mut again.engine) {}

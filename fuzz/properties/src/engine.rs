@@ -292,7 +292,7 @@ fn step<'m>(
             bench.tell(&ToBridge::Ask { request: script.arbitrary()?, what });
         }
         8 => bench.tell(&match script.int_in_range(0..=4)? {
-            0 => ToBridge::Initialise,
+            0 => ToBridge::Initialise { request: script.arbitrary()? },
             4 => ToBridge::Abandon { job: job.id },
             1 => ToBridge::Bootloader,
             2 => ToBridge::Drive { data: script.arbitrary()?, control: script.arbitrary()? },

@@ -5,9 +5,12 @@
 //! Method: a folder for the whole computer. Before the first byte of a job leaves, the file `open.PRINTER.JOB` is made durable
 //! there. It is removed when the job is known to have ended in an orderly way, or when the printer was reset. So a crash
 //! leaves it behind, whatever crashed. The folder is sticky: nobody can remove a file of another user. Whoever learns that
-//! another user's job has ended writes `closed.PRINTER.JOB` instead. It counts for whoever wrote it, and for everybody if root or the
-//! owner of the open note did: this program cannot know whether another user may open the bridge. Files are [durable] and
-//! whole; links are never followed; a folder with a note's name is none.
+//! another user's job has ended writes `closed.PRINTER.JOB.ANY` instead, under a name that is drawn, so that nobody can take it
+//! before. It counts for whoever wrote it, and for everybody if root or the owner of the open note did: this program cannot know
+//! whether another user may open the bridge. Files are [durable] and whole; links are never followed; a folder with a note's name
+//! is none.
+//! A note of the bridge's present start is left open by others: its job may not have reached the bridge yet, and would begin
+//! without one.
 //! A bridge is known by its serial number, however it is reached, because it has one port. A raw device is known by its path.
 //! Limits: another computer that shares a bridge over the network does not see the folder. A user who may print may also
 //! write false facts here: the worst that follows is a needless reset.
@@ -90,6 +93,11 @@ pub(crate) enum Standing {
 }
 
 impl Unfinished {
+    /// Whether it was noted in this start of the bridge. It may not have begun there yet; only its sender closes it.
+    pub(crate) fn is_of(&self, boot: Option<u32>) -> bool {
+        self.boot.is_some() && self.boot == boot
+    }
+
     /// Judges by what the bridge, in its start `boot`, says of its last job and remembers of those before. A bridge takes a new
     /// job only when the last one has ended, so within one start another job in its place proves that this one has.
     pub(crate) fn standing<'p>(
@@ -261,16 +269,10 @@ impl Printers {
     pub fn close(&self, printer: &Printer, job: &str) -> Result<(), PrintersError> {
         let open = self.path("open", printer, job);
         match fs::remove_file(&open) {
-            Ok(()) => {
-                // Another user may have closed it before.
-                let _ = fs::remove_file(self.path("closed", printer, job));
-                self.sync()
-            }
+            Ok(()) => self.sync(),
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
             // Another user's, in a sticky folder.
-            Err(error) if error.kind() == io::ErrorKind::PermissionDenied => {
-                self.write(&self.path("closed", printer, job), &fact(&open).unwrap_or_default())
-            }
+            Err(error) if error.kind() == io::ErrorKind::PermissionDenied => self.write_closed(&open),
             Err(error) => Err(io_error("remove", &open)(error)),
         }
     }
@@ -279,10 +281,11 @@ impl Printers {
     pub fn unfinished(&self, printer: &Printer) -> Result<Vec<Unfinished>, PrintersError> {
         let prefix = format!("open.{}.", printer.file_name());
         let mut found = Vec::new();
-        for name in self.names()? {
+        let names = self.names()?;
+        for name in &names {
             let Some(job) = name.strip_prefix(&prefix) else { continue };
-            let path = self.folder.join(&name);
-            if is_note(&path) && !is_closed(&path, &self.folder.join(closed(&name))) {
+            let path = self.folder.join(name);
+            if is_note(&path) && !self.closing(name, &names).any(|closed| is_closed(&path, &closed)) {
                 let boot = fact(&path).and_then(|fact| fact.boot);
                 found.push(Unfinished { job: job.to_owned(), boot });
             }
@@ -298,18 +301,18 @@ impl Printers {
         Ok(Noted(self.names()?.into_iter().filter(notes).collect()))
     }
 
-    /// Notes that a printer was reset and holds nothing any more of what was noted before.
-    pub fn reset(&self, noted: &Noted) -> Result<(), PrintersError> {
+    /// Notes that a printer was reset and holds nothing any more of what was noted before; but for what was noted in this start
+    /// of its bridge.
+    pub fn reset(&self, noted: &Noted, boot: Option<u32>) -> Result<(), PrintersError> {
         for name in &noted.0 {
             let path = self.folder.join(name);
+            if boot.is_some() && fact(&path).is_some_and(|fact| fact.boot == boot) {
+                continue;
+            }
             match fs::remove_file(&path) {
-                Ok(()) => {
-                    let _ = fs::remove_file(self.folder.join(closed(name)));
-                }
+                Ok(()) => {}
                 Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-                Err(error) if error.kind() == io::ErrorKind::PermissionDenied => {
-                    self.write(&self.folder.join(closed(name)), &fact(&path).unwrap_or_default())?;
-                }
+                Err(error) if error.kind() == io::ErrorKind::PermissionDenied => self.write_closed(&path)?,
                 Err(error) => return Err(io_error("remove", &path)(error)),
             }
         }
@@ -331,6 +334,25 @@ impl Printers {
         durable::write(path, &text, Access::Everyone).map_err(io_error("write", path))
     }
 
+    /// Closes another user's note.
+    fn write_closed(&self, open: &Path) -> Result<(), PrintersError> {
+        let name = open.file_name().unwrap_or_default().to_string_lossy();
+        let names = self.names()?;
+        if self.closing(&name, &names).any(|closed| is_closed(open, &closed)) {
+            return Ok(());
+        }
+        let moment = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let any = checksum(format!("{} {}", moment.as_nanos(), std::process::id()).as_bytes());
+        let path = self.folder.join(format!("{}{any:08x}", closed_prefix(&name)));
+        self.write(&path, &fact(open).unwrap_or_default())
+    }
+
+    /// What is said to close the open note of this name.
+    fn closing<'n>(&self, open: &str, names: &'n [String]) -> impl Iterator<Item = PathBuf> + use<'_, 'n> {
+        let prefix = closed_prefix(open);
+        names.iter().filter(move |name| name.starts_with(&prefix)).map(|name| self.folder.join(name))
+    }
+
     /// Makes removals durable.
     fn sync(&self) -> Result<(), PrintersError> {
         durable::sync_folder(&self.folder).map_err(io_error("write", &self.folder))
@@ -339,7 +361,7 @@ impl Printers {
     /// Removes pairs that cancel out, as far as they are this user's.
     fn tidy(&self) {
         for name in self.names().unwrap_or_default() {
-            if let Some(rest) = name.strip_prefix("closed.") {
+            if let Some((rest, _)) = name.strip_prefix("closed.").and_then(|rest| rest.rsplit_once('.')) {
                 let open = self.folder.join(format!("open.{rest}"));
                 let closed = self.folder.join(&name);
                 // The open one first: without it the other means nothing.
@@ -388,9 +410,9 @@ fn is_closed(open: &Path, closed: &Path) -> bool {
     found.is_file() && counts && fact(open).unwrap_or_default() == fact(closed).unwrap_or_default()
 }
 
-/// The name of the file that closes the one of this name.
-fn closed(open: &str) -> String {
-    format!("closed.{}", open.strip_prefix("open.").unwrap_or(open))
+/// How the names of the files begin that close the one of this name.
+fn closed_prefix(open: &str) -> String {
+    format!("closed.{}.", open.strip_prefix("open.").unwrap_or(open))
 }
 
 /// The folder all users share. An administrator makes it: this program must not choose one that others could have made first.
@@ -442,11 +464,13 @@ mod tests {
         // One that begins behind the reset stays.
         let noted = printers.noted(Some(&one)).unwrap();
         printers.begin(&one, "0000000d", Some(5)).unwrap();
-        printers.reset(&noted).unwrap();
+        printers.reset(&noted, Some(5)).unwrap();
+        assert_eq!([&one, &two, &device].map(count), [2, 1, 1], "they may not have begun yet");
+        printers.reset(&noted, Some(6)).unwrap();
         assert_eq!([&one, &two, &device].map(count), [1, 1, 1]);
-        printers.reset(&printers.noted(Some(&one)).unwrap()).unwrap();
+        printers.reset(&printers.noted(Some(&one)).unwrap(), None).unwrap();
         assert_eq!([&one, &two, &device].map(count), [0, 1, 1]);
-        printers.reset(&printers.noted(None).unwrap()).unwrap();
+        printers.reset(&printers.noted(None).unwrap(), None).unwrap();
         assert_eq!([&one, &two, &device].map(count), [0, 0, 0]);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }
@@ -457,8 +481,8 @@ mod tests {
         let printers = Printers::at(folder.path()).unwrap();
         let printer = Printer::Bridge(1);
         printers.begin(&printer, "0000000a", Some(5)).unwrap();
-        let [open, closed] = ["open", "closed"].map(|kind| printers.path(kind, &printer, "0000000a"));
-        fs::copy(open, closed).unwrap();
+        let open = printers.path("open", &printer, "0000000a");
+        fs::copy(open, folder.path().join("closed.bridge-0000000000000001.0000000a.1")).unwrap();
         assert_eq!(printers.unfinished(&printer).unwrap(), []);
         // The same job has begun once more since, in another start of the bridge.
         printers
@@ -479,15 +503,19 @@ mod tests {
         let printer = Printer::Bridge(1);
         fs::create_dir(folder.path().join("open.bridge-0000000000000001.0000000f")).unwrap();
         printers.begin(&printer, "0000000a", Some(5)).unwrap();
-        let [open, closed] = ["open", "closed"].map(|kind| printers.path(kind, &printer, "0000000a"));
-        fs::copy(open, &closed).unwrap();
+        let open = printers.path("open", &printer, "0000000a");
+        let closed = folder.path().join("closed.bridge-0000000000000001.0000000a.1");
+        fs::copy(&open, &closed).unwrap();
         assert_eq!(printers.unfinished(&printer).unwrap(), []);
         // Where the test may choose whose a file is.
         if std::os::unix::fs::lchown(&closed, Some(65_534), None).is_ok() {
             printers.begin(&printer, "0000000b", Some(5)).unwrap();
             assert_eq!(printers.unfinished(&printer).unwrap().len(), 2);
+            // It hinders nobody who may, either.
+            printers.write_closed(&open).unwrap();
+            assert_eq!(printers.unfinished(&printer).unwrap().len(), 1);
         }
-        printers.reset(&printers.noted(None).unwrap()).unwrap();
+        printers.reset(&printers.noted(None).unwrap(), None).unwrap();
         assert_eq!(printers.unfinished(&printer).unwrap(), []);
     }
 
@@ -567,7 +595,7 @@ mod tests {
         }
         assert_eq!(printers.unfinished(&one).unwrap(), []);
         // A reset is no other printer.
-        printers.reset(&printers.noted(None).unwrap()).unwrap();
+        printers.reset(&printers.noted(None).unwrap(), None).unwrap();
         assert!(printers.is_one_way(&one));
         for _ in 0..2 {
             printers.note_one_way(&one, false).unwrap();

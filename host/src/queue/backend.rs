@@ -480,7 +480,7 @@ mod tests {
         rig.call.identity = "one".into();
         assert_eq!(rig.run(&bytes, &|| false).0, Exit::Ok);
         rig.printers.begin(&printer, "raw-1-2", None).unwrap();
-        rig.printers.reset(&rig.printers.noted(None).unwrap()).unwrap();
+        rig.printers.reset(&rig.printers.noted(None).unwrap(), None).unwrap();
         rig.call.identity = "three".into();
         assert_eq!(rig.run(&bytes, &|| false).0, Exit::Ok);
     }

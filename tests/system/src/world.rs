@@ -125,6 +125,8 @@ pub struct World {
     /// What an operating system still has to print, and all of it.
     plain: Option<(usize, usize)>,
     before: Progress,
+    /// The job of which bytes have crossed in this step.
+    crossed: Option<u32>,
     speed: usize,
 }
 
@@ -165,6 +167,7 @@ impl World {
             to_host: [const { VecDeque::new() }; USERS],
             plain: None,
             before: NOTHING,
+            crossed: None,
             speed: [40, 200, 800, 2000][draw.below(4)],
         };
         world.start(None);
@@ -350,7 +353,7 @@ impl World {
         let Ok(listing) = std::fs::read_dir(&self.notes) else { return };
         for name in listing.filter_map(|item| item.ok()?.file_name().into_string().ok()) {
             if let Some(rest) = name.strip_prefix("open.") {
-                let path = self.notes.join(format!("closed.{rest}"));
+                let path = self.notes.join(format!("closed.{rest}.1"));
                 if std::fs::copy(self.notes.join(&name), &path).is_ok() {
                     crate::users::give_to_stranger(&path);
                 }
@@ -414,6 +417,12 @@ impl World {
             if !board.alone.poll(&mut board.engine) {
                 break;
             }
+        }
+        if self.flash.is_off() {
+            // The supply went while something was written: the board did nothing behind that.
+            self.crossed = None;
+            self.ended();
+            return self.stop(Down::Cut, draw);
         }
         let task = board.engine.task();
         let mut violation = None;
@@ -482,6 +491,7 @@ impl World {
 
     /// Bytes of this job reach the printer.
     fn take(&mut self, number: u32, bytes: &[u8]) {
+        self.crossed = (!bytes.is_empty()).then_some(number);
         if bytes.is_empty() {
             return;
         }
@@ -568,10 +578,11 @@ impl World {
                     | JobState::Storing
             )
         };
-        if !ends(&after) || before == after || after.job == 0 {
+        let number = after.job;
+        // A job as long as the one before it may begin and end in one step.
+        if !ends(&after) || (before == after && self.crossed != Some(number)) || number == 0 {
             return;
         }
-        let number = after.job;
         if after.state == JobState::Stored {
             return;
         }

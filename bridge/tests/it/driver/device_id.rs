@@ -126,7 +126,7 @@ fn a_printer_that_is_busy_or_in_use_is_not_asked_for_its_device_id() {
     bench.tell(&ToBridge::Drive { data: 0x55, control: 0b0111 });
     bench.pass(2_000 * MS);
     assert_eq!(events(&bench), []);
-    bench.tell(&ToBridge::Initialise);
+    bench.tell(&ToBridge::Initialise { request: 7 });
     bench.pass(600 * MS);
     assert_eq!(events(&bench), [Event::NoDeviceId]);
 }

@@ -84,7 +84,7 @@ fn no_poll_keeps_the_processor_for_a_millisecond() {
             bench.ask(2, Ask::DeviceId);
             let before = bench.cable.taken().len();
             send(&mut bench, 7, &foreign(1_000));
-            bench.tell(&ToBridge::Initialise);
+            bench.tell(&ToBridge::Initialise { request: 7 });
             bench.pass(3_000 * MS);
             assert_eq!(bench.state(), JobState::Done, "{name}, {handshake:?}");
             assert!(bench.cable.taken()[before..] == foreign(1_000), "{name}, {handshake:?}");

@@ -166,7 +166,7 @@ fn the_printer_is_asked_only_when_it_is_known_to_stand_between_two_jobs() {
     let mut bench = Bench::new(&mut board, peripheral());
     assert_eq!((bench.ask(1, Ask::Printer), bench.cable.taken().len()), (unsure.clone(), 0));
     // Behind a reset, a job, or the printer's own switch it does.
-    bench.tell(&ToBridge::Initialise);
+    bench.tell(&ToBridge::Initialise { request: 7 });
     bench.pass(10 * MS);
     assert_eq!(bench.ask(2, Ask::Printer), whole);
     let mut board = Board::new(4096, 4096);

@@ -224,15 +224,17 @@ fn a_job_of_which_nothing_has_crossed_is_printed_behind_a_reset_and_another_one_
     let stream = a_raw_job();
     let mut rig = Rig::new();
     rig.open(1, &stream, 0);
-    assert_eq!(rig.tell(ToBridge::Initialise).text, Vec::<String>::new());
+    assert_eq!(rig.tell(ToBridge::Initialise { request: 7 }).text, Vec::<String>::new());
     assert_eq!(rig.engine.task(), Some(Task::Initialise));
     // Data that come meanwhile wait.
     rig.open(1, &stream, 900);
     while rig.engine.work() {}
     assert!(rig.engine.output().is_empty());
     rig.engine.done(Outcome::Done);
+    let lines = ToHost::Lines { request: 7, lines: Lines::IDLE, fault: None };
+    assert!(rig.said().text.contains(&format!("{lines:?}")), "it is told when it has been done");
     assert!(!rig.engine.output().is_empty());
-    assert_eq!(rig.tell(ToBridge::Initialise).text, refused(Refusal::JobOpen, 1));
+    assert_eq!(rig.tell(ToBridge::Initialise { request: 7 }).text, refused(Refusal::JobOpen, 1));
     assert_eq!(rig.send(1, JobKind::Raw, &stream).state, JobState::Done);
     assert!(rig.printed == stream);
 }
@@ -302,7 +304,7 @@ proptest! {
                 5 => ToBridge::Data { job, offset: number.wrapping_sub(100), bytes: &bytes },
                 6 => ToBridge::Cancel { job },
                 7 => ToBridge::Ask { request: 1, what: Ask::Printer },
-                8 => ToBridge::Initialise,
+                8 => ToBridge::Initialise { request: 7 },
                 9 => ToBridge::Drive { data: small, control: small },
                 10 => ToBridge::Probe { request: 1, data: small, control: small },
                 11 => ToBridge::Abandon { job },

@@ -101,7 +101,7 @@ fn a_job_nobody_has_the_data_of_any_more_can_be_given_up() {
     let said = rig.tell(ToBridge::Hello { version: VERSION, schema: SCHEMA });
     let progress = said.progress.unwrap();
     assert_eq!((progress.job, progress.accepted, progress.limit, progress.printed), (1, 0, 0, 100));
-    rig.tell(ToBridge::Initialise);
+    rig.tell(ToBridge::Initialise { request: 7 });
     assert_eq!((rig.engine.progress().state, rig.engine.task()), (JobState::Lost, Some(Task::Initialise)));
 }
 

@@ -38,17 +38,19 @@ pub fn reset(query: &mut Query<'_>, printers: &Printers) -> Result<(), Failure> 
     }
     let noted = printers.noted(Some(&Printer::Bridge(query.bridge().serial)))?;
     query.initialise(BRIDGE)?;
-    Ok(printers.reset(&noted)?)
+    Ok(printers.reset(&noted, Some(query.bridge().boot))?)
 }
 
 /// Gives up the job that is open at a bridge, whoever has sent it, and has the printer reset; notes for everybody that it was.
 /// Says what the bridge made of it.
 pub fn give_up(query: &mut Query<'_>, job: u32, printers: &Printers) -> Result<Progress, Failure> {
-    let noted = printers.noted(Some(&Printer::Bridge(query.bridge().serial)))?;
+    let printer = Printer::Bridge(query.bridge().serial);
+    let noted = printers.noted(Some(&printer))?;
     let ended = query.abandon(job, BRIDGE)?;
     // A printer that is off is reset by the bridge when it is back, so the notes stay until then.
     if !matches!(query.lines(BRIDGE)?, (_, Some(Fault::PowerOff))) {
-        printers.reset(&noted)?;
+        printers.close(&printer, &format!("{job:08x}"))?;
+        printers.reset(&noted, Some(query.bridge().boot))?;
     }
     Ok(ended)
 }
@@ -123,7 +125,7 @@ impl Delivery<'_> {
     fn settle_earlier_jobs(&self, query: &mut Query<'_>) -> Result<(), Failure> {
         let (printer, boot) = (Printer::Bridge(query.bridge().serial), query.bridge().boot);
         let progress = *query.progress();
-        let mut owed = Vec::new();
+        let (mut owed, mut forgotten) = (None, Vec::new());
         for unfinished in self.printers.unfinished(&printer)? {
             match unfinished.standing(boot, &progress, query.past()) {
                 Standing::Ended { printed, whole } => {
@@ -133,17 +135,19 @@ impl Delivery<'_> {
                 }
                 Standing::WithBridge => {}
                 Standing::ResetOwed => {
-                    owed.push(ResetOwed { printer: printer.clone(), job: unfinished.job });
+                    owed = Some(ResetOwed { printer: printer.clone(), job: unfinished.job.clone() });
+                    if !unfinished.is_of(Some(boot)) {
+                        forgotten.push(unfinished.job);
+                    }
                 }
             }
         }
-        let Some(last) = owed.last().cloned() else { return Ok(()) };
+        let Some(owed) = owed else { return Ok(()) };
         if self.is_between_jobs(query, &printer)? {
             // Another user has had it reset, or has switched it off and on.
-            owed.iter().for_each(|owed| self.close(&printer, &owed.job));
+            forgotten.iter().for_each(|job| self.close(&printer, job));
             return Ok(());
         }
-        let owed = last;
         if !self.caller.agrees(&Question::Reset(&owed)) {
             return Err(Failure::ResetOwed(owed));
         }
@@ -403,7 +407,7 @@ impl<'d, 'a> Watcher<'d, 'a> {
         if progress.printed > 0 && !self.moved.replace(true) {
             // What crosses the port now comes behind whatever reset was owed.
             for earlier in printers.unfinished(&printer).unwrap_or_default() {
-                if earlier.job != self.job {
+                if earlier.job != self.job && !earlier.is_of(shown) {
                     self.delivery.close(&printer, &earlier.job);
                 }
             }
@@ -411,7 +415,8 @@ impl<'d, 'a> Watcher<'d, 'a> {
     }
 
     /// What is known of the printer once the job has ended. A bridge that says a job is lost resets the printer by itself, as
-    /// long as it does not lose its memory too; so that job stays noted until bytes of another one have crossed the port.
+    /// long as it does not lose its memory too; so that job stays noted, as one of no start that is known, until bytes of another
+    /// one have crossed the port.
     /// `followed` says that the bridge has printed another job since: then this one had ended, or was reset away, before it.
     fn ended(&self, outcome: Outcome, followed: bool) {
         let Some(printer) = self.printer() else { return };
@@ -419,12 +424,9 @@ impl<'d, 'a> Watcher<'d, 'a> {
             Outcome::Printed | Outcome::Cancelled | Outcome::Broken | Outcome::Stored => {
                 self.delivery.close(&printer, &self.job);
             }
-            Outcome::Lost => {}
-            Outcome::Forgotten => {
-                if !followed
-                    && !self.delivery.printers.knows(&printer, &self.job)
-                    && let Err(error) = self.delivery.printers.begin(&printer, &self.job, None)
-                {
+            Outcome::Forgotten if followed || self.delivery.printers.knows(&printer, &self.job) => {}
+            Outcome::Lost | Outcome::Forgotten => {
+                if let Err(error) = self.delivery.printers.begin(&printer, &self.job, None) {
                     self.delivery.note(&with_causes(&error));
                 }
             }

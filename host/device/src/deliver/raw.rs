@@ -21,7 +21,7 @@ impl Delivery<'_> {
             if !self.caller.agrees(&Question::Reset(&owed)) {
                 return Err(Failure::ResetOwed(owed));
             }
-            self.printers.reset(&noted)?;
+            self.printers.reset(&noted, None)?;
         }
         loop {
             if self.caller.wish() != Wish::GoOn {

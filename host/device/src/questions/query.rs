@@ -326,8 +326,7 @@ impl<'t> Query<'t> {
     /// itself was reset, and whose data nobody has sent again, is given up by it.
     pub fn initialise(&mut self, patience: Duration) -> Result<(), QueryError> {
         let number = self.next();
-        // A reset is not answered, but a refusal would come before the answer to the question behind it.
-        let messages = [ToBridge::Initialise, ToBridge::Ask { request: number, what: Ask::Lines }];
+        let messages = [ToBridge::Initialise { request: number }];
         exchange(self.link, &mut self.reader, &messages, patience, &mut |heard| match heard {
             Heard::Refused(Refusal::JobOpen, job) if job != 0 => Some(Err(QueryError::JobOpen(job))),
             Heard::Lines(request, ..) if request == number => Some(Ok(())),

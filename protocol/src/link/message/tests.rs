@@ -56,7 +56,7 @@ fn to_bridge() -> Vec<(ToBridge<'static>, &'static [u8])> {
         (settings(Handshake::Busy), &[5, 0xa0, 6, 0xa0, 6, 0xa0, 6, 0xf4, 3, 0, 0xd8, 4, 0x3f]),
         (settings(Handshake::BusyAck), &[5, 0xa0, 6, 0xa0, 6, 0xa0, 6, 0xf4, 3, 1, 0xd8, 4, 0x3f]),
         (settings(Handshake::Ack), &[5, 0xa0, 6, 0xa0, 6, 0xa0, 6, 0xf4, 3, 2, 0xd8, 4, 0x3f]),
-        (ToBridge::Initialise, &[6]),
+        (ToBridge::Initialise { request: 300 }, &[6, 0xac, 0x02]),
         (ToBridge::Bootloader, &[7]),
         (ToBridge::Drive { data: 0xaa, control: 0b0111 }, &[8, 0xaa, 7]),
         (ToBridge::Probe { request: 300, data: 0xaa, control: 0b0111 }, &[9, 0xac, 0x02, 0xaa, 7]),

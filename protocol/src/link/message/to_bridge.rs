@@ -53,9 +53,13 @@ pub enum ToBridge<'a> {
     },
     /// Sets how the port is driven, from the next byte on.
     Configure(PortSettings),
-    /// Resets the printer with a pulse on nInit. Refused while a job is open. A job that was open when the bridge itself was
-    /// reset, and whose data have not been sent again, is given up as [`JobState::Lost`].
-    Initialise,
+    /// Resets the printer with a pulse on nInit; answered by [`ToHost::Lines`] when that is done. Refused while a job is open. A
+    /// job that was open when the bridge itself was reset, and whose data have not been sent again, is given up as
+    /// [`JobState::Lost`].
+    Initialise {
+        /// Number of the question, returned with the answer.
+        request: u16,
+    },
     /// Restarts the bridge in its boot loader, for flashing. Refused while a job is open.
     Bootloader,
     /// Sets the port's outputs by hand, for the wiring test; [`Ask::Lines`] reads the inputs. The idle levels (data 0, control 7)

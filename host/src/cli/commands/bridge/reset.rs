@@ -44,7 +44,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<()> {
     let printers = Printers::of_system()?;
     if args.by_hand {
-        return Ok(printers.reset(&printers.noted(None)?)?);
+        return Ok(printers.reset(&printers.noted(None)?, None)?);
     }
     let address = named_or_only(args.to.as_ref())?;
     let mut link = address.open()?;
