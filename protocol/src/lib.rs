@@ -19,3 +19,7 @@ pub mod runs;
 mod scan;
 pub mod status;
 pub mod walk;
+
+/// Vendor and product number of the bridge on USB: a test number of pid.codes, so the maker's name has to fit too. How to get one of
+/// our own: `packaging/usb-id.md`.
+pub const USB: (u16, u16) = (0x1209, 0x0001);

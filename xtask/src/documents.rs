@@ -104,3 +104,22 @@ fn links_find_their_file_and_heading() {
     assert!(tried > 100, "only {tried} links were found");
     assert!(lost.is_empty(), "links that lead nowhere:\n{}", lost.join("\n"));
 }
+
+#[test]
+fn packages_of_other_systems_agree_on_version_and_number() {
+    let version = env!("CARGO_PKG_VERSION");
+    let (vendor, product) = protocol::USB;
+    let number = format!("ATTR{{idVendor}}==\"{vendor:04x}\", ATTR{{idProduct}}==\"{product:04x}\"");
+    for (file, line) in [
+        ("macos/foilpress.rb", format!("version \"{version}\"")),
+        ("others/PKGBUILD", format!("pkgver={version}\n")),
+        ("others/foilpress.spec", format!("Version:        {version}\n")),
+        ("others/default.nix", format!("version = \"{version}\"")),
+        ("debian/changelog", format!("foilpress ({version}-")),
+        ("70-foilpress.rules", number.clone()),
+        ("71-foilpress-queues.rules", number),
+    ] {
+        let text = fs::read_to_string(root().join("packaging").join(file)).expect("a file");
+        assert!(text.contains(&line), "packaging/{file} does not say `{}`", line.trim());
+    }
+}

@@ -11,6 +11,7 @@ mod gate;
 mod package;
 mod preview;
 mod queue;
+mod release;
 mod runner;
 mod tools;
 
@@ -55,6 +56,15 @@ enum Task {
         #[arg(long)]
         dev: bool,
     },
+    /// Build what people download, for every system that this one can build for, try it, and write dist/
+    Release {
+        /// Only say what is missing, and how to get it
+        #[arg(long)]
+        dry_run: bool,
+        /// Only these systems [default: all]
+        #[arg(long, value_delimiter = ',', value_parser = release::names())]
+        only: Vec<String>,
+    },
 }
 
 /// Names the program to the tests, where it is built already.
@@ -73,6 +83,7 @@ fn main() -> ExitCode {
         Task::Queue => finish(queue::run(root)),
         Task::Package { dev: false } => finish(package::build(root, package::Profile::Release)),
         Task::Package { dev: true } => finish(package::build(root, package::Profile::Dev)),
+        Task::Release { dry_run, only } => finish(release::run(root, &only, dry_run)),
     }
 }
 

@@ -39,36 +39,21 @@ pub fn build(root: &Path, profile: Profile) -> Result<()> {
     pack(root, &built, profile)
 }
 
-/// The package of this program.
+/// Another system's package: the compiler's name of it, and the time of the release in seconds since 1970.
+pub struct Release<'r> {
+    /// The compiler's name of the system.
+    pub triple: &'r str,
+    /// Whether it is another architecture than this machine's, so that its libraries are not here.
+    pub is_foreign: bool,
+    /// When, in seconds since 1970.
+    pub time: &'r str,
+}
+
+/// The package of this program on this machine.
 fn pack(root: &Path, built: &Path, profile: Profile) -> Result<()> {
-    let target = firmware::workspace_target(root);
-    // `cargo-deb` looks for what it packs below the build's folder, in `release`: one of our own, to hold nothing else.
-    let target_of_package = target.join("package");
-    let folder = target_of_package.join("release");
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder)?;
-    fs::copy(built, folder.join("foilpress"))?;
-    let tree = folder.join("tree");
-    succeed(Command::new(built).arg("generate").arg(&tree))?;
-    let mut pages = command("gzip", &["-9", "--no-name", "--recursive"]);
-    succeed(pages.arg(tree.join("usr/share/man")))?;
-    // The bridge's images, and the programs they were made of, which logs are read with.
     firmware::build(root)?;
-    let images = folder.join("firmware");
-    fs::create_dir(&images)?;
-    for file in firmware::INSTALLED {
-        let built = firmware::target(root).join(file);
-        fs::copy(&built, images.join(file))
-            .with_context(|| format!("{} cannot be copied", built.display()))?;
-    }
-    let package = target_of_package.join("foilpress.deb");
-    let mut make = Command::new(tool(&target)?);
-    make.args(["--no-build", "--locked", "--quiet", "--strip", "--output"]).arg(&package);
-    if profile == Profile::Dev {
-        // Nobody keeps this one.
-        make.arg("--fast");
-    }
-    succeed(make.current_dir(root.join("host")).env("CARGO_TARGET_DIR", &target_of_package))?;
+    let package = firmware::workspace_target(root).join("package/foilpress.deb");
+    let tree = make(root, built, built, &package, profile, None)?;
     check(&package, &tree)?;
     if is_root() {
         install_here(root, &package)?;
@@ -77,6 +62,56 @@ fn pack(root: &Path, built: &Path, profile: Profile) -> Result<()> {
     }
     println!("{}", package.display());
     Ok(())
+}
+
+/// Makes the package of this program, with pages that a program of this machine writes, the `native` one; gives the folder of what that wrote.
+pub fn make(
+    root: &Path,
+    built: &Path,
+    native: &Path,
+    package: &Path,
+    profile: Profile,
+    release: Option<&Release<'_>>,
+) -> Result<PathBuf> {
+    let target = firmware::workspace_target(root);
+    // `cargo-deb` looks for what it packs below the build's folder, in `release`: one of our own, to hold nothing else.
+    let target_of_package = target.join("package");
+    let folder = target_of_package.join(release.map_or("", |release| release.triple)).join("release");
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder)?;
+    fs::copy(built, folder.join("foilpress"))?;
+    let tree = folder.join("tree");
+    succeed(Command::new(native).arg("generate").arg(&tree))?;
+    let mut pages = command("gzip", &["-9", "--no-name", "--recursive"]);
+    succeed(pages.arg(tree.join("usr/share/man")))?;
+    // The bridge's images, and the programs they were made of, which logs are read with.
+    let images = folder.join("firmware");
+    fs::create_dir(&images)?;
+    for file in firmware::INSTALLED {
+        let built = firmware::target(root).join(file);
+        fs::copy(&built, images.join(file))
+            .with_context(|| format!("{} cannot be copied", built.display()))?;
+    }
+    let mut make = Command::new(tool(&target)?);
+    make.args(["--no-build", "--locked", "--quiet", "--output"]).arg(package);
+    match release {
+        // The optimised program has no symbols any more.
+        Some(release) => {
+            make.args(["--no-strip", "--target", release.triple]).env("SOURCE_DATE_EPOCH", release.time);
+            if release.is_foreign {
+                make.args(["--variant", "foreign"]);
+            }
+        }
+        None => {
+            make.arg("--strip");
+        }
+    }
+    if profile == Profile::Dev {
+        // Nobody keeps this one.
+        make.arg("--fast");
+    }
+    succeed(make.current_dir(root.join("host")).env("CARGO_TARGET_DIR", &target_of_package))?;
+    Ok(tree)
 }
 
 /// The package of the tests' own build, for the gate; left out with a word where print queues are.

@@ -41,7 +41,7 @@ pub(super) fn read_jpeg(path: &Path, options: &Options) -> Result<Option<Artwork
     let (width, height) = (u32::from(width), u32::from(height));
     size::check_pixels(path, width, height)?;
     whole_jpeg(path, &bytes)?;
-    if options.reserved {
+    if options.reserves() {
         return Err(
             wrong(path, "the picture is CMYK, but reserved colours are sRGB").hint("convert it to sRGB")
         );

@@ -111,7 +111,7 @@ fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<
         return layered::read(file, options, observer);
     }
     let name = stem(file);
-    let named = names::ink(&name).filter(|_| !options.reserved);
+    let named = names::ink(&name).filter(|_| !options.reserves());
     let looks = named.map_or(Looks::Layer, |named| match picture::looks(file, options.page()) {
         Looks::Tones if options.tones.contains(named.ink) => Looks::Layer,
         looks => looks,
@@ -143,7 +143,7 @@ fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<
         _ => "it has colours and only a part of its name is an ink",
     };
     let part = named.map(|named| (named.ink.name(), why));
-    let meant = part.or_else(close).filter(|_| !options.reserved && art.drawn.dots() > 0);
+    let meant = part.or_else(close).filter(|_| !options.reserves() && art.drawn.dots() > 0);
     if let Some((known, why)) = meant {
         art.notes.push(format!(
             "{}: printed as a picture in process inks, because {why}; to print it as a layer of {known}, rename the file to \

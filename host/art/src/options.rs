@@ -14,6 +14,8 @@ pub struct Options {
     pub dpi: Option<f64>,
     /// Whether the vendor's reserved colours stand for their inks.
     pub reserved: bool,
+    /// Colours of the art that stand for inks besides: sRGB as drawn.
+    pub colours: Vec<(Ink, [u8; 3])>,
     /// Largest difference of red, green and blue from a reserved colour; `None` for each ink's own tolerance.
     pub tolerance: Option<u8>,
     /// Pages of a PDF, PostScript or TIFF file.
@@ -33,6 +35,11 @@ pub struct Options {
 }
 
 impl Options {
+    /// Whether colours stand for inks.
+    pub(super) fn reserves(&self) -> bool {
+        self.reserved || !self.colours.is_empty()
+    }
+
     /// The page that was chosen by its number.
     pub(super) fn page(&self) -> Option<u32> {
         if let Pages::Number(number) = self.pages { Some(number) } else { None }
@@ -75,6 +82,7 @@ impl Default for Options {
             size: None,
             dpi: None,
             reserved: false,
+            colours: Vec::new(),
             tolerance: None,
             pages: Pages::Only,
             tones: InkSet::EMPTY,

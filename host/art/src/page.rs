@@ -112,7 +112,7 @@ impl Page {
         let side = |pixels: usize| u32::try_from(pixels).map_err(|_| problem());
         let size = (side(wide)?, side(high)?);
         Ok(match self.0 {
-            Pixels::Black(plane) if dpi == DOTS && !options.reserved => {
+            Pixels::Black(plane) if dpi == DOTS && !options.reserves() => {
                 let drawn = bitplane::cut(&plane, window);
                 let colour = Some(Colour::black(drawn.clone()));
                 Artwork { drawn, colour, ..Artwork::blank(name, dots) }
@@ -122,7 +122,7 @@ impl Page {
                 expand(&plane, &mut pixels);
                 tagged(name, window.cut(pixels, width, BYTES), size, dots, options)
             }
-            Pixels::Numbered(page) if dpi == DOTS && !options.reserved => {
+            Pixels::Numbered(page) if dpi == DOTS && !options.reserves() => {
                 let (colour, drawn) = page.colour(window);
                 Artwork { drawn, colour, ..Artwork::blank(name, dots) }
             }

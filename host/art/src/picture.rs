@@ -200,7 +200,7 @@ pub(super) fn tagged_artwork(
 /// Art from one picture: reserved colours as layers if the options say so, the rest as colour.
 pub(super) fn artwork(name: &str, mut pixels: Pixels, options: &Options) -> Result<Artwork, Diagnosis> {
     let sides = (f64::from(pixels.width), f64::from(pixels.height));
-    let unstated = if options.reserved { Unstated::PixelPerDot } else { Unstated::FillRoom };
+    let unstated = if options.reserves() { Unstated::PixelPerDot } else { Unstated::FillRoom };
     let dots = size::dots(&pixels.path, sides, pixels.dpi, unstated, options, &mut pixels.notes)?;
     Ok(artwork_of(name, pixels, dots, options))
 }
@@ -240,12 +240,12 @@ pub(super) fn opaque_artwork<const N: usize>(
     options: &Options,
 ) -> Artwork {
     // Reserved colours may be nearly white.
-    if !options.reserved {
+    if !options.reserves() {
         scans::clean::<N>(pixels.as_chunks_mut().0);
     }
     let drawn = plane_of::<N>(&pixels, size, dots, |p| p[N - 3..] != [255; 3]);
     let (mut layers, mut notes) = (Vec::new(), Vec::new());
-    if options.reserved {
+    if options.reserves() {
         let mut rgb: Vec<u8> =
             pixels.as_chunks::<N>().0.iter().flat_map(|p| [p[N - 3], p[N - 2], p[N - 1]]).collect();
         let found = reserved::take(&mut rgb, size, dots, options);

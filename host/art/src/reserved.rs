@@ -1,4 +1,4 @@
-//! The vendor's reserved colours: a picture whose pixels name inks.
+//! Reserved colours, the vendor's and those that the user names: a picture whose pixels name inks.
 //!
 //! Problem: owners draw white as 230,230,230 and gold as 225,160,0. Drawing programs soften every edge, and the colour of
 //! a soft edge is not reserved, so it would print as a fringe of process dots around the gold. Worse, the soft edge of black
@@ -15,7 +15,6 @@
 
 mod classes;
 
-use inks::InkSet;
 use protocol::ink::{Ink, Kind};
 use rayon::prelude::*;
 
@@ -48,6 +47,9 @@ const TABLE: [Reserved; 6] = [
     reserved(Ink::MetallicCyan, [0, 176, 201], 12),
     reserved(Ink::Black, [0, 0, 0], 8),
 ];
+
+/// The tolerance of a colour that the user names: that of the vendor's metals.
+const NAMED: u8 = 12;
 
 /// An ink that the picture has elsewhere is on at least so many pixels, and its red, green and blue differ by at least so much.
 const LEAST: u64 = 64;
@@ -101,7 +103,7 @@ impl Found {
 
 /// Takes the reserved colours out of a picture: their pixels become white, and layers at the dots.
 pub(super) fn take(rgb: &mut [u8], size: (u32, u32), dots: (usize, usize), options: &Options) -> Found {
-    let table = in_use(&options.inks, options.tolerance);
+    let table = in_use(options);
     let (classes, edges) = classify(rgb.as_chunks::<3>().0, size.0 as usize, &table);
     let mut counts = vec![(0u64, 0u64); 1 + table.len()];
     for &(_, to) in edges.iter().filter(|(_, to)| *to != OTHER) {
@@ -111,17 +113,31 @@ pub(super) fn take(rgb: &mut [u8], size: (u32, u32), dots: (usize, usize), optio
     let pixels_of = blank(rgb.as_chunks_mut::<3>().0, &mut class);
     counts.iter_mut().zip(pixels_of).for_each(|(count, pixels)| count.0 = pixels);
     let class = resample::classes(class, size, dots);
-    let layers = (1..).zip(&table).filter(|&(at, _)| counts[usize::from(at)].0 > 0).map(|(at, entry)| {
-        let plane = bitplane::from_bytes(dots.0, &class, |class| class == at);
-        let colour = entry.colour.map(|v| v.to_string()).join(",");
-        let name = format!("the reserved colour {colour}");
-        Layer { ink: entry.ink, name, place: None, shape: Shape::Solid(plane) }
-    });
-    let layers = layers.collect();
-    let left_out = TABLE.iter().map(|entry| entry.ink).filter(|&ink| !options.inks.contains(ink)).collect();
     let bared = counts[0].1;
-    let counts = counts.into_iter().skip(1).filter(|(pixels, _)| *pixels > 0).collect();
-    Found { layers, counts, bared, left_out }
+    let (mut layers, mut of_inks) = (Vec::new(), Vec::new());
+    for (first, ink) in table.iter().map(|entry| entry.ink).enumerate() {
+        if table[..first].iter().any(|entry| entry.ink == ink) {
+            continue;
+        }
+        // Several colours of one ink are one layer.
+        let of_ink: Vec<(u8, &Reserved)> = (1..)
+            .zip(&table)
+            .filter(|&(at, entry)| entry.ink == ink && counts[usize::from(at)].0 > 0)
+            .collect();
+        if of_ink.is_empty() {
+            continue;
+        }
+        let plane = bitplane::from_bytes(dots.0, &class, |class| of_ink.iter().any(|&(at, _)| at == class));
+        let colours: Vec<String> =
+            of_ink.iter().map(|(_, entry)| entry.colour.map(|v| v.to_string()).join(",")).collect();
+        let name = format!("the reserved colour {}", colours.join(" and "));
+        layers.push(Layer { ink, name, place: None, shape: Shape::Solid(plane) });
+        let all = of_ink.iter().map(|&(at, _)| counts[usize::from(at)]);
+        of_inks.push(all.fold((0, 0), |sum, count| (sum.0 + count.0, sum.1 + count.1)));
+    }
+    let vendors = TABLE.iter().map(|entry| entry.ink).filter(|_| options.reserved);
+    let left_out = vendors.filter(|&ink| !options.inks.contains(ink)).collect();
+    Found { layers, counts: of_inks, bared, left_out }
 }
 
 /// The class of every pixel, and the pixels whose class was that of an edge or accidental, with their new class.
@@ -235,10 +251,13 @@ fn blank(pixels: &mut [[u8; 3]], class: &mut [u8]) -> [u64; 256] {
         .reduce(|| [0; 256], |a, b| std::array::from_fn(|class| a[class] + b[class]))
 }
 
-/// The entries of the table whose inks are allowed, with this tolerance if one is set.
-fn in_use(inks: &InkSet, tolerance: Option<u8>) -> Vec<Reserved> {
-    let with = |entry: &Reserved| Reserved { tolerance: tolerance.unwrap_or(entry.tolerance), ..*entry };
-    TABLE.iter().filter(|entry| inks.contains(entry.ink)).map(with).collect()
+/// The colours that the user names, and those of the vendor's whose inks are allowed, with this tolerance if one is set.
+fn in_use(options: &Options) -> Vec<Reserved> {
+    let named = options.colours.iter().map(|&(ink, colour)| reserved(ink, colour, NAMED));
+    let vendors = TABLE.into_iter().filter(|entry| options.reserved && options.inks.contains(entry.ink));
+    let with =
+        |entry: Reserved| Reserved { tolerance: options.tolerance.unwrap_or(entry.tolerance), ..entry };
+    named.chain(vendors).map(with).collect()
 }
 
 /// The class of an edge pixel: the nearer of two colours around it whose mixture it is; `None` if it is no such mixture.
@@ -297,13 +316,49 @@ mod tests {
     }
 
     #[test]
+    fn colours_that_the_user_names_are_inks_and_several_of_one_ink_one_layer() {
+        let side = 60;
+        let mut pixels = soft_disc(side, [255, 0, 0], [255; 3]);
+        // A bar of the other colour of the same ink, one of another ink, and one of the vendor's gold, which nobody asked for.
+        for (y, colour) in [(2, [200, 0, 200]), (54, [0, 128, 0]), (58, [225, 160, 0])] {
+            for at in y * side..(y + 2) * side {
+                pixels[3 * at..3 * at + 3].copy_from_slice(&colour);
+            }
+        }
+        let colours = vec![
+            (Ink::MetallicGold, [255, 0, 0]),
+            (Ink::White, [4, 124, 3]),
+            (Ink::MetallicGold, [200, 0, 200]),
+        ];
+        let options = Options { colours, ..Options::default() };
+        let size = (side as u32, side as u32);
+        let found = take(&mut pixels, size, (side, side), &options);
+        let inks: Vec<Ink> = found.layers.iter().map(|layer| layer.ink).collect();
+        assert_eq!(inks, [Ink::MetallicGold, Ink::White]);
+        let disc = std::f64::consts::PI * 20.0 * 20.0 + 120.0;
+        let gold = plane(&found.layers[0]) as f64;
+        assert!((gold - disc).abs() < 0.02 * disc, "{gold} dots of {disc}, soft edges included");
+        assert_eq!(plane(&found.layers[1]), 120, "within the tolerance");
+        let plain = pixels.as_chunks::<3>().0.iter().filter(|pixel| **pixel != [255; 3]).count();
+        assert_eq!(plain, 120, "the vendor's gold is a plain colour here");
+        let narrow = Options { tolerance: Some(0), ..options };
+        let found = take(&mut [4, 125, 3].repeat(side * side), size, (side, side), &narrow);
+        assert!(found.layers.is_empty());
+    }
+
+    #[test]
     fn softened_edges_leave_no_fringe_of_colour() {
         let side = 300;
         let area = std::f64::consts::PI * 100.0 * 100.0;
         for (at, entry) in TABLE.iter().enumerate() {
             for ground in [[255; 3], TABLE[(at + 1) % TABLE.len()].colour] {
                 let mut rgb = soft_disc(side, entry.colour, ground);
-                let found = take(&mut rgb, (300, 300), (side, side), &Options::default());
+                let found = take(
+                    &mut rgb,
+                    (300, 300),
+                    (side, side),
+                    &Options { reserved: true, ..Options::default() },
+                );
                 assert!(rgb.iter().all(|&v| v == 255), "{:?} on {ground:?} leaves colour", entry.ink);
                 assert!(
                     found.layers.iter().all(|layer| layer.ink == entry.ink || ground != [255; 3]),
@@ -330,7 +385,8 @@ mod tests {
             let small = image::imageops::resize(&large, 206, 206, filter);
             assert!(small.pixels().any(|pixel| pixel.0[0] > 235), "the filter rings");
             let mut rgb = small.into_raw();
-            let found = take(&mut rgb, (206, 206), (206, 206), &Options::default());
+            let found =
+                take(&mut rgb, (206, 206), (206, 206), &Options { reserved: true, ..Options::default() });
             assert!(rgb.iter().all(|&v| v == 255), "{filter:?} leaves colour");
             let inks: Vec<Ink> = found.layers.iter().map(|layer| layer.ink).collect();
             assert_eq!(inks, [Ink::White, Ink::Black], "{filter:?}");
@@ -349,10 +405,10 @@ mod tests {
         };
         let two = |x, y| (x, y) == (9, 9) || (x, y) == (10, 10);
         let mut rgb = picture(&two);
-        let found = take(&mut rgb, (20, 20), (20, 20), &Options::default());
+        let found = take(&mut rgb, (20, 20), (20, 20), &Options { reserved: true, ..Options::default() });
         assert!(found.layers.is_empty() && rgb == picture(&two));
         let mut rgb = picture(&|x, y| y == 9 && x > 3);
-        let found = take(&mut rgb, (20, 20), (20, 20), &Options::default());
+        let found = take(&mut rgb, (20, 20), (20, 20), &Options { reserved: true, ..Options::default() });
         assert_eq!((found.layers[0].ink, plane(&found.layers[0])), (Ink::MetallicSilver, 16));
     }
 
@@ -410,7 +466,7 @@ mod tests {
     #[test]
     fn a_stray_grey_calls_for_silver_only_if_silver_is_at_hand() {
         let grey = [189, 193, 197].repeat(100);
-        let with = |inks: &str| Options { inks: inks.parse().unwrap(), ..Options::default() };
+        let with = |inks: &str| Options { reserved: true, inks: inks.parse().unwrap(), ..Options::default() };
         let mut rgb = grey.clone();
         let found = take(&mut rgb, (10, 10), (10, 10), &with("white,metallic-gold,process"));
         assert!(found.layers.is_empty() && rgb == grey);
@@ -425,7 +481,7 @@ mod tests {
         let (gold, off) = ([225, 160, 0], [225, 173, 0]);
         for (tolerance, wanted) in [(None, 1), (Some(13), 2), (Some(0), 1)] {
             let mut rgb = [gold, off].concat();
-            let options = Options { tolerance, ..Options::default() };
+            let options = Options { reserved: true, tolerance, ..Options::default() };
             let found = take(&mut rgb, (2, 1), (2, 1), &options);
             assert_eq!(plane(&found.layers[0]), wanted, "tolerance {tolerance:?}");
         }

@@ -38,7 +38,7 @@ const EXAMPLES: usize = 3;
 /// What the other options of these commands are about.
 const GROUPS: &[(&str, &[&str])] = &[
     ("Document", &["material", "colour-space", "samples", "document"]),
-    ("Artwork", &["reserved", "tolerance", "dpi", "page", "pages", "tones", "gamma", "accept"]),
+    ("Artwork", &["reserved", "colour", "tolerance", "dpi", "page", "pages", "tones", "gamma", "accept"]),
     ("Layers of ink", &["order", "passes", "knockout", "white", "choke", "spread", "finish"]),
     (
         "Inks and materials",

@@ -11,10 +11,6 @@ use embassy_usb::msos::{self, windows_version};
 use embassy_usb::{Builder, Config, UsbDevice};
 use static_cell::StaticCell;
 
-/// A test number of pid.codes, to be replaced by one of the project's own before boards are sold.
-const VENDOR: u16 = 0x1209;
-const PRODUCT: u16 = 0x0001;
-
 /// Any number that is no standard request.
 const MSOS_REQUEST: u8 = 0x20;
 
@@ -48,7 +44,7 @@ pub fn build(driver: Usb, serial_number: &'static str, shared: &'static Shared) 
     static CONTROL: StaticCell<[u8; DEVICE_ID_MAX]> = StaticCell::new();
     static STATE: StaticCell<State<'static>> = StaticCell::new();
 
-    let mut config = Config::new(VENDOR, PRODUCT);
+    let mut config = Config::new(protocol::USB.0, protocol::USB.1);
     config.manufacturer = Some("Foilpress");
     config.product = Some("Foilpress bridge");
     config.serial_number = Some(serial_number);

@@ -33,14 +33,11 @@ const SAYS_SIZES: &str = "<< /EndPage { exch pop 2 ne dup { (%%PageSize:) print 
     { ( ) print 20 string cvs print } forall (\\n) print flush } if } >> setpagedevice";
 
 /// What to do without Ghostscript.
-const NO_GHOSTSCRIPT: &str = "install it (Debian, Ubuntu: apt install ghostscript; macOS: brew install ghostscript), or export the \
-    page as PNG";
+const NO_GHOSTSCRIPT: &str = "install it (Debian, Ubuntu: apt install ghostscript; macOS: brew install ghostscript; Windows: the 64-bit \
+    installer from ghostscript.com, in its usual folder), or export the page as PNG";
 
 /// The most spot colours of a document that have plates of their own; it is ten without this, and never more.
 const SPOTS: &str = "-dMaxSpots=60";
-
-/// Always draws in bands: a transparent page that fits into memory loses its spot plates in Ghostscript 10.00.
-const BANDS: &str = "-dMaxBitmap=0";
 
 /// The plates that every page has.
 pub(super) const PROCESS: [&str; 4] = ["Cyan", "Magenta", "Yellow", "Black"];
@@ -188,7 +185,7 @@ fn leaves(
     };
     let to = if only.is_some() { place(1) } else { folder.path().join("draft%d.tif") };
     let options = [
-        vec!["-sCompression=lzw".into(), SPOTS.into(), BANDS.into()],
+        vec!["-sCompression=lzw".into(), SPOTS.into()],
         only.map_or_else(Vec::new, one_page),
         crop(path, part)?,
     ]
@@ -301,8 +298,7 @@ pub(super) fn separate(
     overprints: bool,
 ) -> Result<String, Diagnosis> {
     let mut options =
-        [one_page(page), crop(path, part)?, vec!["-dPrintSpotCMYK".into(), SPOTS.into(), BANDS.into()]]
-            .concat();
+        [one_page(page), crop(path, part)?, vec!["-dPrintSpotCMYK".into(), SPOTS.into()]].concat();
     if overprints {
         options.extend(["-c".into(), "true setoverprint".into()]);
     }

@@ -12,7 +12,7 @@
 
 use std::ffi::OsStr;
 use std::io::Read as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use super::super::kinds::{self, Order};
@@ -49,6 +49,17 @@ pub enum Interpreter {
     Older,
 }
 
+/// Ghostscript's program. Its installer for Windows leaves the search path alone; the newest one in the usual folder is taken.
+fn program() -> PathBuf {
+    if !cfg!(windows) {
+        return "gs".into();
+    }
+    let folder = std::env::var_os("ProgramFiles").map(|folder| PathBuf::from(folder).join("gs"));
+    let versions = folder.and_then(|folder| std::fs::read_dir(folder).ok()).into_iter().flatten();
+    let programs = versions.filter_map(|version| Some(version.ok()?.path().join("bin/gswin64c.exe")));
+    programs.filter(|program| program.is_file()).max().unwrap_or_else(|| "gswin64c".into())
+}
+
 /// A command that draws a document with these options, among them the device and where its output goes, a name in
 /// `folder`. It runs there, and files of its own are there, too, which it leaves behind when it is stopped. Its complaints go to
 /// the standard error.
@@ -58,7 +69,7 @@ pub fn command<O: AsRef<OsStr>>(
     folder: &Path,
     options: impl IntoIterator<Item = O>,
 ) -> Command {
-    let mut command = Command::new("gs");
+    let mut command = Command::new(program());
     command
         .current_dir(folder)
         .env("TMPDIR", folder)
@@ -111,7 +122,7 @@ pub fn order(pixels: &[u8]) -> Result<Order, ProcessError> {
     if let Some(order) = Order::seen(pixels) {
         return Ok(order);
     }
-    let mut command = Command::new("gs");
+    let mut command = Command::new(program());
     command.args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-g1x1", "-sOutputFile=-"]);
     command.arg(format!("-sDEVICE={}", kinds::DEVICE)).args(["-c", "showpage"]);
     let mut process = Process::start(command.stdout(Stdio::piped()), process::limit())?;

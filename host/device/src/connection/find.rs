@@ -60,7 +60,7 @@ fn ports() -> Vec<Port> {
             let product = device.product.unwrap_or_else(|| format!("{:04x}:{:04x}", device.vid, device.pid));
             // Windows tells its driver's words instead of the device's.
             let named = |text: &str| text.to_ascii_lowercase().contains("foilpress");
-            let numbered = (device.vid, device.pid) == usb::BRIDGE;
+            let numbered = (device.vid, device.pid) == protocol::USB;
             let bridge = named(&product)
                 || device.manufacturer.as_deref().is_some_and(named)
                 || (numbered && cfg!(windows));

@@ -14,8 +14,6 @@ use rusb::{Context, Device, DeviceHandle, Direction, TransferType, UsbContext as
 
 use super::transport::{Transport, WRITE_PATIENCE};
 
-/// The bridge's vendor and product number: a test number of pid.codes, so the maker's name has to fit too.
-pub const BRIDGE: (u16, u16) = (0x1209, 0x0001);
 /// The maker's name in the descriptors.
 const MAKER: &str = "Foilpress";
 /// Class of an interface that speaks a language of its own.
@@ -106,7 +104,7 @@ pub fn attached(numbers: (u16, u16)) -> io::Result<Vec<Attached>> {
 
 /// The bridges on USB, those that may not be opened included.
 pub fn bridges() -> io::Result<Vec<Attached>> {
-    let mut found = attached(BRIDGE)?;
+    let mut found = attached(protocol::USB)?;
     // One whose maker is not to be known is taken for a bridge: its numbers fit, and why it is closed is worth saying.
     found.retain(|device| device.maker.as_deref().is_none_or(|maker| maker == MAKER));
     Ok(found)

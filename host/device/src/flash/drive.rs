@@ -3,7 +3,7 @@
 //! Limits: the drive accepts any file without an answer; only a bridge that is back with the new version shows that the image
 //! arrived complete. The board restarts with the last block, so the drive disappears while the file is still open.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
@@ -65,7 +65,7 @@ pub fn find() -> Vec<(Chip, PathBuf)> {
 
 #[cfg(target_os = "linux")]
 fn mounted() -> Vec<PathBuf> {
-    fs::read_to_string("/proc/self/mounts").map(|text| mount_points(&text)).unwrap_or_default()
+    std::fs::read_to_string("/proc/self/mounts").map(|text| mount_points(&text)).unwrap_or_default()
 }
 
 /// The mount points of FAT file systems in Linux's list.
@@ -94,7 +94,7 @@ fn mount_points(mounts: &str) -> Vec<PathBuf> {
 
 #[cfg(target_os = "macos")]
 fn mounted() -> Vec<PathBuf> {
-    let volumes = fs::read_dir("/Volumes").into_iter().flatten();
+    let volumes = std::fs::read_dir("/Volumes").into_iter().flatten();
     volumes.filter_map(|entry| Some(entry.ok()?.path())).collect()
 }
 
@@ -137,6 +137,7 @@ pub fn copy(drive: &Path, file: &[u8], observer: &dyn Observer) -> Result<(), Dr
 mod tests {
     use super::*;
     use observe::Silent;
+    use std::fs;
 
     fn drive(board: &str) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();

@@ -40,9 +40,12 @@ pub struct LayersArgs {
     /// metallic red 163,36,115, metallic blue 0,176,201, black 0,0,0
     #[arg(long)]
     pub reserved: bool,
-    /// Largest difference of red, green and blue from a reserved colour, 0 to 60 [default: 8 for white and black, 12
-    /// for metals]
-    #[arg(long, value_name = "STEPS", requires = "reserved", value_parser = whole(0..=60u8))]
+    /// Print a colour of the art in an ink, such as "#ff0000=gold"; may be repeated
+    #[arg(long, value_name = "RRGGBB=INK", value_parser = colour)]
+    pub colour: Vec<(Ink, [u8; 3])>,
+    /// Largest difference of red, green and blue from a colour that stands for an ink, 0 to 60 [default: 8 for the vendor's
+    /// white and black, 12 for others]
+    #[arg(long, value_name = "STEPS", value_parser = whole(0..=60u8))]
     pub tolerance: Option<u8>,
     /// Resolution of the pictures in pixels per inch, if a file states none or a wrong one; of a drawing that states no size on
     /// paper, its units per inch
@@ -153,6 +156,19 @@ fn passes(text: &str) -> Result<(Ink, u8), String> {
     }
 }
 
+/// A colour and the ink it stands for.
+fn colour(text: &str) -> Result<(Ink, [u8; 3]), String> {
+    let (colour, ink) =
+        text.split_once('=').ok_or("write it as a colour and an ink, such as #ff0000=gold")?;
+    let digits = colour.trim().trim_start_matches('#');
+    let number = u32::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 6 && digits.is_ascii());
+    let number = number.ok_or_else(|| {
+        format!("`{colour}` is no colour; write six digits of red, green and blue, such as #ff0000")
+    })?;
+    let [_, red, green, blue] = number.to_be_bytes();
+    Ok((names::typed(ink.trim())?, [red, green, blue]))
+}
+
 fn order(text: &str) -> Result<Order, String> {
     match text {
         "rules" => Ok(Order::Rules),
@@ -179,11 +195,51 @@ impl LayersArgs {
             Some(change) if change.starts_with(['+', '-']) => format!("default,white,{change}"),
             Some(list) => list.to_owned(),
         };
-        let inks = set("--inks", &text)?;
+        let mut inks = set("--inks", &text)?;
+        if self.inks.is_none() {
+            inks = self.colour.iter().fold(inks, |inks, &(ink, _)| inks.with(ink));
+        }
         if inks.is_empty() {
             return Err(usage("--inks leaves no ink to print with"));
         }
         Ok(inks)
+    }
+
+    /// The colours that stand for inks.
+    fn colours(&self) -> Result<Vec<(Ink, [u8; 3])>> {
+        /// Far more than cartridges.
+        const MOST: usize = 16;
+        let inks = self.inks()?;
+        if let Some((ink, _)) = self.colour.iter().find(|(ink, _)| !inks.contains(*ink)) {
+            return Err(usage(format!("--colour names {}, which is not among --inks", ink.name())));
+        }
+        if self.colour.len() > MOST {
+            return Err(usage(format!("--colour is given {} times; {MOST} is the most", self.colour.len())));
+        }
+        if self.tolerance.is_some()
+            && !self.reserved
+            && self.white != Some(White::Reserved)
+            && self.colour.is_empty()
+        {
+            return Err(usage(
+                "--tolerance says how near a colour must be to that of an ink; add --reserved or --colour",
+            ));
+        }
+        let paper = self.colour.iter().find(|(_, colour)| *colour == [255; 3]);
+        if let Some((ink, _)) = paper {
+            return Err(usage(format!("--colour #ffffff={} is bare paper, which no ink prints", ink.name())));
+        }
+        for (at, (ink, colour)) in self.colour.iter().enumerate() {
+            if let Some((other, _)) = self.colour[..at].iter().find(|(_, earlier)| earlier == colour) {
+                let [r, g, b] = colour;
+                return Err(usage(format!(
+                    "--colour gives #{r:02x}{g:02x}{b:02x} two inks, {} and {}",
+                    other.name(),
+                    ink.name()
+                )));
+            }
+        }
+        Ok(self.colour.clone())
     }
 
     /// How the art is read.
@@ -193,6 +249,7 @@ impl LayersArgs {
             size,
             dpi: self.dpi,
             reserved: self.reserved || self.white == Some(White::Reserved),
+            colours: self.colours()?,
             tolerance: self.tolerance,
             pages: match (self.page, &self.pages[..]) {
                 (Some(page), _) => Pages::Number(page),
@@ -305,6 +362,7 @@ pub struct Work {
     foilpress layers white.png gold.png black.png\n  \
     foilpress layers decal/ --passes white=3 --finish artwork --mirror --media film\n  \
     foilpress layers art.png --reserved --inks white,gold,black\n  \
+    foilpress layers logo.svg --colour \"#c8a000=gold\" --colour 808080=silver\n  \
     foilpress layers art.svg --white silhouette --choke 0.1mm --repeat 2x4 --gap 3mm --crop-marks\n  \
     foilpress layers decal.pdf --page 1 --white alpha\n  \
     foilpress layers plates.pdf --pages white,gold,black    (one page per ink)\n  \

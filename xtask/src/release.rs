@@ -1,0 +1,396 @@
+//! `cargo xtask release`: what people download, for every system that one Linux machine can build for, in `dist/`.
+//!
+//! Problem: whoever owns such a printer has a Raspberry Pi or a Windows computer, and no compiler.
+//! Method: one optimised build a system with a cross linker; a Debian package for each kind of Debian, an archive with everything
+//! in one folder for the others; then the program of each archive runs here, by itself or under an emulator, and what it makes
+//! of a sample is compared byte for byte with this machine's. `tried.md` says which of these were tried. Sums and a part of the changelog go
+//! beside them.
+//! Paths of this machine are taken out of the programs, and times are that of the commit, so the same commit gives the same bytes with
+//! the same tools.
+//! Cost: an optimised build for each system. Limits: macOS is not built here (`packaging/macos`); nothing is signed; a board, WinUSB and
+//! a real printer are for people to try.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::{env, fs};
+
+use anyhow::{Context as _, Result, bail, ensure};
+
+use crate::package::{self, Profile};
+use crate::{cargo, command, firmware, succeed};
+
+/// What an archive is.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Form {
+    /// A Debian package of this architecture.
+    Deb(&'static str),
+    /// A folder as `.tar.gz`.
+    Tar,
+    /// A folder as `.zip`.
+    Zip,
+}
+
+/// A system.
+struct System {
+    /// What people call it, as in the archive's name.
+    name: &'static str,
+    /// What the compiler calls it.
+    triple: &'static str,
+    form: Form,
+    /// The linker and C compiler, and the Debian package that brings it; none if it is this machine's own.
+    linker: Option<(&'static str, &'static str)>,
+    /// What runs its programs here, and the Debian package that brings that; none if they run by themselves.
+    runner: Option<(&'static [&'static str], &'static str)>,
+}
+
+const SYSTEMS: [System; 5] = [
+    System {
+        name: "debian-amd64",
+        triple: "x86_64-unknown-linux-gnu",
+        form: Form::Deb("amd64"),
+        linker: None,
+        runner: None,
+    },
+    System {
+        name: "linux-x86_64",
+        triple: "x86_64-unknown-linux-musl",
+        form: Form::Tar,
+        linker: Some(("musl-gcc", "musl-tools")),
+        runner: None,
+    },
+    System {
+        name: "windows-x86_64",
+        triple: "x86_64-pc-windows-gnu",
+        form: Form::Zip,
+        linker: Some(("x86_64-w64-mingw32-gcc", "gcc-mingw-w64-x86-64")),
+        runner: Some((&["wine"], "wine64")),
+    },
+    System {
+        name: "debian-arm64",
+        triple: "aarch64-unknown-linux-gnu",
+        form: Form::Deb("arm64"),
+        linker: Some(("aarch64-linux-gnu-gcc", "gcc-aarch64-linux-gnu libc6-dev-arm64-cross")),
+        runner: Some((&["qemu-aarch64-static", "-L", "/usr/aarch64-linux-gnu"], "qemu-user-static")),
+    },
+    System {
+        name: "debian-armhf",
+        triple: "armv7-unknown-linux-gnueabihf",
+        form: Form::Deb("armhf"),
+        linker: Some(("arm-linux-gnueabihf-gcc", "gcc-arm-linux-gnueabihf libc6-dev-armhf-cross")),
+        runner: Some((&["qemu-arm-static", "-L", "/usr/arm-linux-gnueabihf"], "qemu-user-static")),
+    },
+];
+
+/// The most bytes of a program, and of an archive for Windows.
+const LARGEST_PROGRAM: u64 = 30 << 20;
+const LARGEST_ZIP: u64 = 25 << 20;
+
+/// The names of all systems.
+pub fn names() -> [&'static str; SYSTEMS.len()] {
+    SYSTEMS.map(|system| system.name)
+}
+
+/// Builds, packs and tries what is asked for; all systems if none is. `dry`: only says what is missing.
+pub fn run(root: &Path, only: &[String], dry: bool) -> Result<()> {
+    let chosen: Vec<&System> = SYSTEMS
+        .iter()
+        .filter(|system| only.is_empty() || only.iter().any(|name| name == system.name))
+        .collect();
+    let missing: Vec<String> = chosen.iter().flat_map(|system| system.missing()).collect();
+    for line in &missing {
+        println!("missing: {line}");
+    }
+    if dry {
+        println!(
+            "{} of {} systems can be built",
+            chosen.iter().filter(|s| s.missing().is_empty()).count(),
+            chosen.len()
+        );
+        return Ok(());
+    }
+    ensure!(missing.is_empty(), "nothing was built, because something is missing");
+    let release = Release::of(root)?;
+    let _ = fs::remove_dir_all(&release.dist);
+    fs::create_dir_all(&release.dist)?;
+    firmware::build(root)?;
+    let mut tried = String::from(
+        "| system | program | archive | version, sample, layers and plan | the same bytes as on amd64 |\n|---|---|---|---|---|\n",
+    );
+    let mut expected = None;
+    for system in chosen {
+        println!("== {}", system.name);
+        let program = release.build(system)?;
+        let size = fs::metadata(&program)?.len();
+        ensure!(
+            size <= LARGEST_PROGRAM,
+            "the program for {} has {size} bytes, more than {LARGEST_PROGRAM}",
+            system.name
+        );
+        let archive = release.pack(system, &program)?;
+        let length = fs::metadata(&archive)?.len();
+        ensure!(
+            system.form != Form::Zip || length <= LARGEST_ZIP,
+            "{} has {length} bytes",
+            archive.display()
+        );
+        let made = release.try_program(system, &program)?;
+        let same = made == *expected.get_or_insert_with(|| made.clone());
+        let with = system.runner.map_or("by itself", |(runner, _)| runner[0]);
+        tried += &format!(
+            "| {} | {:.1} MB | {:.1} MB | {with} | {} |\n",
+            system.name,
+            size as f64 / 1e6,
+            length as f64 / 1e6,
+            if same { "yes" } else { "**no**" }
+        );
+        ensure!(same, "the program for {} makes other bytes of the same sample", system.name);
+    }
+    for image in firmware::INSTALLED.iter().filter(|name| name.ends_with(".uf2")) {
+        fs::copy(firmware::target(root).join(image), release.dist.join(image))?;
+    }
+    tried += NOT_TRIED;
+    fs::write(release.dist.join("tried.md"), tried)?;
+    fs::write(release.dist.join("changes.md"), changes(root)?)?;
+    release.sums()?;
+    println!("{}", release.dist.display());
+    Ok(())
+}
+
+/// What this machine cannot try.
+const NOT_TRIED: &str = "\nNot tried: WinUSB and COM ports of a real bridge on Windows, macOS, a real board, a real printer. The packages for \
+    arm64 and armhf were unpacked, not installed.\n\nThe bridge has the USB number 1209:0001, which is for tests: boards must not be passed on with \
+    it (packaging/usb-id.md).\n";
+
+/// The part of the changelog that is not released yet.
+fn changes(root: &Path) -> Result<String> {
+    let text = fs::read_to_string(root.join("CHANGELOG.md")).context("the changelog cannot be read")?;
+    let mut parts = text.split("\n## ").skip(1);
+    parts.next().map(|part| format!("## {part}")).context("the changelog has no part")
+}
+
+impl System {
+    /// What is not on this machine, and how to get it.
+    fn missing(&self) -> Vec<String> {
+        let mut missing = Vec::new();
+        let installed = command("rustup", &["target", "list", "--installed"]).output();
+        let installed =
+            installed.map(|said| String::from_utf8_lossy(&said.stdout).into_owned()).unwrap_or_default();
+        if !installed.lines().any(|line| line == self.triple) {
+            missing.push(format!("{}: rustup target add {}", self.name, self.triple));
+        }
+        let runner = self.runner.map(|(runner, package)| (runner[0], package));
+        let packer = match self.form {
+            Form::Zip => Some(("zip", "zip")),
+            Form::Deb(_) | Form::Tar => None,
+        };
+        for (program, package) in self.linker.into_iter().chain(runner).chain(packer) {
+            if !on_path(program) {
+                missing.push(format!("{}: {program}: apt install {package}", self.name));
+            }
+        }
+        missing
+    }
+
+    /// The program's file.
+    fn program(&self) -> &'static str {
+        if self.form == Form::Zip { "foilpress.exe" } else { "foilpress" }
+    }
+}
+
+fn on_path(program: &str) -> bool {
+    env::var_os("PATH")
+        .is_some_and(|path| env::split_paths(&path).any(|folder| folder.join(program).is_file()))
+}
+
+/// What all systems share.
+struct Release<'r> {
+    root: &'r Path,
+    dist: PathBuf,
+    version: String,
+    /// Seconds since 1970 of the commit.
+    time: String,
+}
+
+impl Release<'_> {
+    fn of(root: &Path) -> Result<Release<'_>> {
+        let said = command("git", &["log", "-1", "--format=%ct"]).current_dir(root).output()?;
+        let time = String::from_utf8_lossy(&said.stdout).trim().to_owned();
+        ensure!(time.parse::<u64>().is_ok(), "git does not say when the commit was made");
+        let version = env!("CARGO_PKG_VERSION").to_owned();
+        Ok(Release { root, dist: root.join("dist"), version, time })
+    }
+
+    /// The optimised program.
+    fn build(&self, system: &System) -> Result<PathBuf> {
+        let mut build =
+            cargo(&["build", "--release", "--locked", "--package", "foilpress", "--target", system.triple]);
+        let home = env::var_os("CARGO_HOME").map(PathBuf::from);
+        let home =
+            home.or_else(|| Some(PathBuf::from(env::var_os("HOME")?).join(".cargo"))).unwrap_or_default();
+        let mut flags = OsString::new();
+        for (from, to) in [(self.root, "foilpress"), (home.as_path(), "cargo")] {
+            flags.push(format!("--remap-path-prefix={}={to} ", from.display()));
+        }
+        build.env("RUSTFLAGS", flags).env("SOURCE_DATE_EPOCH", &self.time).current_dir(self.root);
+        if let Some((linker, _)) = system.linker {
+            let triple = system.triple.replace('-', "_");
+            build.env(format!("CARGO_TARGET_{}_LINKER", triple.to_uppercase()), linker);
+            build.env(format!("CC_{triple}"), linker);
+        }
+        succeed(&mut build)?;
+        Ok(firmware::workspace_target(self.root).join(system.triple).join("release").join(system.program()))
+    }
+
+    /// The archive in `dist/`.
+    fn pack(&self, system: &System, program: &Path) -> Result<PathBuf> {
+        let name = format!("foilpress-{}-{}", self.version, system.name);
+        match system.form {
+            Form::Deb(architecture) => {
+                let archive = self.dist.join(format!("foilpress_{}_{architecture}.deb", self.version));
+                let is_foreign = system.runner.is_some();
+                let release = package::Release { triple: system.triple, is_foreign, time: &self.time };
+                package::make(
+                    self.root,
+                    program,
+                    &self.native()?,
+                    &archive,
+                    Profile::Release,
+                    Some(&release),
+                )?;
+                Ok(archive)
+            }
+            Form::Tar => {
+                let folder = self.folder(&name, system, program)?;
+                let archive = self.dist.join(format!("{name}.tar.gz"));
+                let mut tar = command(
+                    "tar",
+                    &["--sort=name", "--owner=0", "--group=0", "--numeric-owner", "--mode=go=u-w"],
+                );
+                tar.arg(format!("--mtime=@{}", self.time))
+                    .arg("--use-compress-program=gzip -9n")
+                    .arg("-cf")
+                    .arg(&archive);
+                succeed(tar.arg("-C").arg(folder.parent().unwrap_or(self.root)).arg(&name))?;
+                Ok(archive)
+            }
+            Form::Zip => {
+                let folder = self.folder(&name, system, program)?;
+                let archive = self.dist.join(format!("{name}.zip"));
+                let mut files = Vec::new();
+                all_files(&folder, &mut files)?;
+                files.sort();
+                for file in &files {
+                    succeed(command("touch", &["-d", &format!("@{}", self.time)]).arg(file))?;
+                }
+                let above = folder.parent().unwrap_or(self.root);
+                let mut zip = command("zip", &["-9", "-X", "-q"]);
+                zip.arg(&archive).current_dir(above).env("TZ", "UTC");
+                succeed(zip.args(files.iter().map(|file| file.strip_prefix(above).unwrap_or(file))))?;
+                Ok(archive)
+            }
+        }
+    }
+
+    /// This machine's program, which writes man pages and the like for all.
+    fn native(&self) -> Result<PathBuf> {
+        let native = &SYSTEMS[0];
+        let program =
+            firmware::workspace_target(self.root).join(native.triple).join("release").join(native.program());
+        if program.is_file() { Ok(program) } else { self.build(native) }
+    }
+
+    /// Everything in one folder.
+    fn folder(&self, name: &str, system: &System, program: &Path) -> Result<PathBuf> {
+        let folder = firmware::workspace_target(self.root).join("release-folders").join(name);
+        let _ = fs::remove_dir_all(&folder);
+        let images = folder.join("firmware");
+        fs::create_dir_all(&images)?;
+        fs::copy(program, folder.join(system.program()))?;
+        for image in firmware::INSTALLED {
+            fs::copy(firmware::target(self.root).join(image), images.join(image))?;
+        }
+        for file in ["LICENSE-MIT", "LICENSE-APACHE", "CHANGELOG.md", "docs/install.md"] {
+            let path = self.root.join(file);
+            let name = path.file_name().context("a name")?;
+            fs::copy(&path, folder.join(name))
+                .with_context(|| format!("{} cannot be copied", path.display()))?;
+        }
+        match system.form {
+            Form::Zip => {
+                fs::copy(self.root.join("packaging/windows/start.html"), folder.join("start.html"))?;
+            }
+            Form::Tar | Form::Deb(_) => {
+                succeed(Command::new(self.native()?).arg("generate").arg(folder.join("tree")))?;
+                for rules in ["70-foilpress.rules", "71-foilpress-queues.rules"] {
+                    fs::copy(self.root.join("packaging").join(rules), folder.join(rules))?;
+                }
+            }
+        }
+        Ok(folder)
+    }
+
+    /// Runs the program as its users do first, and gives what it has made.
+    fn try_program(&self, system: &System, program: &Path) -> Result<Vec<Vec<u8>>> {
+        let folder = tempfile(&firmware::workspace_target(self.root), system.name)?;
+        let run = |arguments: &[&str]| {
+            let mut run = match system.runner {
+                Some(([runner, options @ ..], _)) => {
+                    let mut run = command(runner, options);
+                    run.arg(program);
+                    run
+                }
+                _ => Command::new(program),
+            };
+            run.args(arguments).current_dir(&folder).env("WINEDEBUG", "-all").stdin(Stdio::null());
+            let output = run.output().with_context(|| format!("cannot start {run:?}"))?;
+            if !output.status.success() {
+                bail!("{run:?}: {}", String::from_utf8_lossy(&output.stderr));
+            }
+            Ok(output.stdout)
+        };
+        let version = run(&["--version"])?;
+        ensure!(version.starts_with(b"foilpress "), "it said {}", String::from_utf8_lossy(&version));
+        // A folder with a blank and a letter that is not ASCII in its name.
+        let out = "my prints é";
+        run(&["print", "sample:leaf", "--size", "20mm", "--to", "file:leaf.rgl", "-o", out])?;
+        fs::write(folder.join("art.svg"), ART)?;
+        run(&["layers", "art.svg", "--to", "file:layers.rgl"])?;
+        let plan = run(&["plan", "layers.rgl", "--json"])?;
+        let read = |name: &str| {
+            fs::read(folder.join(name)).with_context(|| format!("{} has made no {name}", system.name))
+        };
+        let made = vec![read("leaf.rgl")?, read("layers.rgl")?, plan];
+        ensure!(folder.join(out).join("job.rgl").is_file(), "{} has not written into {out}", system.name);
+        fs::remove_dir_all(&folder)?;
+        Ok(made)
+    }
+
+    /// The sums of all files, for `sha256sum --check`.
+    fn sums(&self) -> Result<()> {
+        let mut names: Vec<OsString> =
+            fs::read_dir(&self.dist)?.filter_map(|item| Some(item.ok()?.file_name())).collect();
+        names.sort();
+        let said = command("sha256sum", &["--"]).args(&names).current_dir(&self.dist).output()?;
+        ensure!(said.status.success(), "sha256sum: {}", String::from_utf8_lossy(&said.stderr));
+        Ok(fs::write(self.dist.join("SHA256SUMS"), said.stdout)?)
+    }
+}
+
+/// A small page in two inks and a tint.
+const ART: &str = r##"<svg xmlns="http://www.w3.org/2000/svg" width="30mm" height="20mm" viewBox="0 0 30 20"><rect width="30" height="20" fill="#f0c080"/><circle cx="15" cy="10" r="6" fill="#204080"/></svg>"##;
+
+fn tempfile(target: &Path, name: &str) -> Result<PathBuf> {
+    let folder = target.join("release-tried").join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder)?;
+    Ok(folder)
+}
+
+fn all_files(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
+    for item in fs::read_dir(folder)? {
+        let path = item?.path();
+        if path.is_dir() { all_files(&path, files)? } else { files.push(path) }
+    }
+    Ok(())
+}
