@@ -45,7 +45,7 @@ fn folders_of(program: &Path, named: Option<OsString>) -> Vec<PathBuf> {
     }
     let Some(beside) = program.parent() else { return Vec::new() };
     let above = beside.parent().unwrap_or(beside);
-    vec![beside.to_owned(), above.join("firmware"), above.join("share/foilpress/firmware")]
+    vec![beside.to_owned(), above.join("firmware"), above.join("share").join("foilpress").join("firmware")]
 }
 
 /// The images that came with the program, for each board or for none.

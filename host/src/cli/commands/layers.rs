@@ -40,8 +40,8 @@ pub struct LayersArgs {
     /// metallic red 163,36,115, metallic blue 0,176,201, black 0,0,0
     #[arg(long)]
     pub reserved: bool,
-    /// Print a colour of the art in an ink, such as "#ff0000=gold"; may be repeated
-    #[arg(long, value_name = "RRGGBB=INK", value_parser = colour)]
+    /// Print colours of the art in inks, such as "#ff0000=gold,808080=silver"; may be repeated
+    #[arg(long, value_name = "RRGGBB=INK", value_delimiter = ',', value_parser = colour)]
     pub colour: Vec<(Ink, [u8; 3])>,
     /// Largest difference of red, green and blue from a colour that stands for an ink, 0 to 60 [default: 8 for the vendor's
     /// white and black, 12 for others]
@@ -362,7 +362,7 @@ pub struct Work {
     foilpress layers white.png gold.png black.png\n  \
     foilpress layers decal/ --passes white=3 --finish artwork --mirror --media film\n  \
     foilpress layers art.png --reserved --inks white,gold,black\n  \
-    foilpress layers logo.svg --colour \"#c8a000=gold\" --colour 808080=silver\n  \
+    foilpress layers art.png --colour \"#e1a000=gold,e6e6e6=white\"\n  \
     foilpress layers art.svg --white silhouette --choke 0.1mm --repeat 2x4 --gap 3mm --crop-marks\n  \
     foilpress layers decal.pdf --page 1 --white alpha\n  \
     foilpress layers plates.pdf --pages white,gold,black    (one page per ink)\n  \
