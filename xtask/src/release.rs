@@ -226,8 +226,17 @@ impl Release<'_> {
 
     /// The optimised program.
     fn build(&self, system: &System) -> Result<PathBuf> {
-        let mut build =
-            cargo(&["build", "--release", "--locked", "--package", "foilpress", "--target", system.triple]);
+        let mut build = cargo(&[
+            "build",
+            "--release",
+            "--locked",
+            "--package",
+            "foilpress",
+            "--features",
+            "serve",
+            "--target",
+            system.triple,
+        ]);
         let home = env::var_os("CARGO_HOME").map(PathBuf::from);
         let home =
             home.or_else(|| Some(PathBuf::from(env::var_os("HOME")?).join(".cargo"))).unwrap_or_default();

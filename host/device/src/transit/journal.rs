@@ -144,7 +144,8 @@ impl Journal {
         } else {
             var("XDG_STATE_HOME").or_else(|| home(".local/state"))
         };
-        let folder = var("FOILPRESS_JOBS").or_else(|| state.map(|state| state.join("foilpress").join("jobs")));
+        let folder =
+            var("FOILPRESS_JOBS").or_else(|| state.map(|state| state.join("foilpress").join("jobs")));
         Journal::at(&folder.ok_or(JournalError::NoFolder)?)
     }
 
