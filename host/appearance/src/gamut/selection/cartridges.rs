@@ -86,8 +86,6 @@ pub(crate) fn choose(
 const SPARED: f64 = 0.01;
 /// What reports show as 0.0000.
 const SHOWN: f64 = 5e-5;
-/// The distance that is barely visible.
-pub(super) const VISIBLE: f64 = 0.01;
 
 /// Whether a distance is no worse than another for what is seen: within 1 % of it, or shown as equal.
 pub(crate) fn is_as_good(without: f64, with: f64) -> bool {

@@ -88,12 +88,6 @@ impl Targets {
 }
 
 impl Fitted {
-    /// By how much the distance of a target is larger than it was, at most.
-    pub fn largest_rise(&self, before: &Fitted) -> f64 {
-        let pairs = self.mixtures.iter().zip(&before.mixtures);
-        pairs.map(|(now, then)| now.distance - then.distance).fold(0.0, f64::max)
-    }
-
     /// The inks that a mixture has at least this weight of, and more than none.
     pub fn inks(&self, candidates: &Candidates, least: f64) -> InkSet {
         let mut used = vec![false; candidates.len()];

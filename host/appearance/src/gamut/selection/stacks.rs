@@ -5,12 +5,9 @@
 //! Method: a sample is fitted to all stacks of the chosen cartridges. Of those beyond the usual ones, the ones with the largest
 //! shares stay, and so do those with the largest shares where no stack may be used that a rule advises against: what takes
 //! such a stack's place has no share beside it. Then the stacks advised against are left out, all of them or those in least
-//! use first, as long as the sample stays within 1 % of the distance it had. What is left of this 1 % is spent on the other
-//! stacks, those in least use first: what brings nothing costs the halftone a choice at each dot, and the printer passes. None
-//! goes whose removal would be seen anywhere in the sample. Cost: one fit of the sample, and one of the targets concerned for
-//! each stack that is tried. Limits: stacks without use in the sample stay, for pixels outside of it.
+//! use first, as long as the sample stays within 1 % of the distance it had. Cost: one fit of the sample, and one of the
+//! targets concerned for each such stack.
 
-use super::cartridges::VISIBLE;
 use super::fitted::{Fitted, Targets};
 use crate::gamut::candidates::Candidates;
 use crate::solve::MixtureError;
@@ -75,21 +72,6 @@ pub(crate) fn choose(
     let shares = targets.shares(&fitted);
     let needed = chosen.iter().copied().filter(|k| !instead.contains(k) || shares[*k] >= WORTH).collect();
     take(needed, None, &mut chosen, &mut fitted)?;
-    // What brings nothing, the rarest first; each is tried once.
-    let kept = fitted.clone();
-    let mut tried: Vec<usize> = Vec::new();
-    loop {
-        let shares = targets.shares(&fitted);
-        let untried = |k: &usize| shares[*k] > 0.0 && !candidates.inks[*k].is_empty() && !tried.contains(k);
-        let next = chosen.iter().copied().filter(untried).min_by(|&a, &b| shares[a].total_cmp(&shares[b]));
-        let Some(next) = next else { break };
-        tried.push(next);
-        let others: Vec<usize> = chosen.iter().copied().filter(|&k| k != next).collect();
-        let less = targets.fit(candidates, &others, Some(&fitted))?;
-        if less.loss <= most && less.largest_rise(&kept) <= VISIBLE {
-            (chosen, fitted) = (others, less);
-        }
-    }
     Ok(chosen)
 }
 
@@ -108,32 +90,6 @@ mod tests {
     use crate::brdf::{Space, Table};
     use crate::gamut::candidates::Printable;
     use inks::Stack;
-
-    /// Two inks all but alike, of which one is enough; and a spot that no other stack prints, which stays though it is rare.
-    #[test]
-    fn stacks_that_bring_nothing_go_and_those_of_a_rare_spot_stay() {
-        let space = Space::half_angle(8);
-        let stacks: Vec<Stack> = ["substrate", "C", "M", "K"].map(|s| s.parse().unwrap()).to_vec();
-        let flat = |level: f64| vec![level; space.columns()];
-        // Dark in red alone, and a little darker at one end of the angles than at the other.
-        let cyan = |tilt: f64| -> Vec<f64> {
-            let level = |j: usize| if j.is_multiple_of(3) { 0.02 } else { 0.2 };
-            (0..space.columns())
-                .map(|j| level(j) * (1.0 + tilt * (j as f64 / space.columns() as f64 - 0.5)))
-                .collect()
-        };
-        let mut curves = Table::new(space.columns());
-        [flat(0.27), cyan(0.02), cyan(-0.02), flat(0.001)].iter().for_each(|row| curves.push(row));
-        let candidates = Candidates::new(&space, &Printable::new(stacks, curves), 0.0).unwrap();
-        let target = |row: &[f64]| candidates.free.target(row).unwrap();
-        // One is out of reach, so that 1 % of the distance is something to spend.
-        let rows = vec![target(&cyan(0.0)), target(&flat(0.35)), target(&flat(0.001))];
-        let targets = Targets { rows, importance: vec![1.0, 1.0, 0.002] };
-        let all = targets.shares(&targets.fit(&candidates, &[0, 1, 2, 3], None).unwrap());
-        assert!(all[1] > 0.1 && all[2] > 0.1 && all[3] < 0.002, "{all:?}");
-        let chosen = choose(&candidates, &[0, 1, 2, 3], &targets).unwrap();
-        assert!(chosen == [0, 1, 3] || chosen == [0, 2, 3], "{chosen:?}");
-    }
 
     /// Substrate, a usual stack that is advised against, its neighbour beyond the list, and one that nobody needs.
     #[test]
