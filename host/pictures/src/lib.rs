@@ -8,9 +8,11 @@
 
 mod chunks;
 mod exr;
+mod floats;
 pub mod resolution;
 
 use std::io::Cursor;
+use std::path::Path;
 
 use image::codecs::hdr::HdrDecoder;
 use image::codecs::png::PngEncoder;
@@ -22,7 +24,21 @@ use image::{
 };
 
 pub use chunks::{MOST_PROFILE, gamma};
-pub use exr::{Floats, exr, exr_sizes};
+pub use exr::{Floats, Primaries, exr, exr_sizes};
+pub use floats::{FloatTiff, float_tiff};
+
+/// The format of a file by its first bytes; Targa files, which have no signature, by the ending of their name.
+pub fn format(bytes: &[u8], path: &Path) -> Option<ImageFormat> {
+    if bytes.starts_with(b"#?RGBE") {
+        return Some(ImageFormat::Hdr);
+    }
+    // BigTIFF, of either order of bytes.
+    if bytes.starts_with(b"II+\0") || bytes.starts_with(b"MM\0+") {
+        return Some(ImageFormat::Tiff);
+    }
+    let targa = || path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("tga"));
+    image::guess_format(bytes).ok().or_else(|| (!bytes.is_empty() && targa()).then_some(ImageFormat::Tga))
+}
 
 /// What a decoder may use.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -11,7 +11,7 @@
 //! quadrature.
 //! Cost: O(columns) per distance. Limits: values below 0 count as 0; cube roots of radiance do not add, only reflectance does.
 
-use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+use std::f64::consts::FRAC_PI_2;
 
 use inks::Curve;
 
@@ -65,10 +65,9 @@ impl Space {
             measure.push(dtheta * theta.sin() * theta.cos());
             angles.push(theta);
         }
-        // 4 sin 2t cos 2t integrated over each cell, up to 45 degrees.
-        let edge = |n: usize| FRAC_PI_2 * (n as f64 / samples as f64).powi(2);
-        let within = |n: usize| -0.5 * (4.0 * edge(n).min(FRAC_PI_4)).cos();
-        let light = (0..samples).map(|n| within(n + 1) - within(n)).take_while(|&q| q > 0.0).collect();
+        // 4 sin 2t cos 2t = 8 sin t cos t cos 2t up to 45 degrees, by the same rule.
+        let light = measure.iter().zip(&angles).map(|(&m, &t)| 8.0 * m * (2.0 * t).cos());
+        let light = light.take_while(|&q: &f64| q > 0.0).collect();
         Space { angles, light, ..Space::interleave(&cosine, &measure) }
     }
 
@@ -388,6 +387,26 @@ mod tests {
             }
         }
         Bivariate { space: Space::tabulated(&cosine, &measure).unwrap(), cells }
+    }
+
+    /// Lobes from the sharpest that a document has to the widest, against an integral of 100,000 steps.
+    #[test]
+    fn the_light_of_sharp_lobes_is_their_integral() {
+        let space = Space::half_angle(32);
+        for alpha in [0.02, 0.03, 0.05, 0.1, 0.3, 1.0] {
+            let row = flat(space.angles().iter().map(|&t| [inks::ggx::lobe(t, alpha); 3]));
+            let steps = 100_000;
+            let expected: f64 = (0..steps)
+                .map(|i| {
+                    let u = (f64::from(i) + 0.5) / f64::from(steps);
+                    let t = 0.5 * FRAC_PI_2 * u * u;
+                    let dt = FRAC_PI_2 * u / f64::from(steps);
+                    4.0 * (2.0 * t).sin() * (2.0 * t).cos() * inks::ggx::lobe(t, alpha) * dt
+                })
+                .sum();
+            let found = space.albedo(&row)[1];
+            assert!((found / expected - 1.0).abs() < 2e-3, "alpha {alpha}: {found}, not {expected}");
+        }
     }
 
     #[test]

@@ -22,7 +22,7 @@ pub enum DocumentError {
     },
     /// The path is not a kind of document.
     #[error(
-        "{}: unknown kind of document; expected a folder of texture maps, a factored document, a .gltf, .glb, \
+        "{}: unknown kind of document; expected a folder of texture maps or its .zip, a factored document, a .gltf, .glb, .mtlx, \
          MERL .binary, RGL .bsdf, goniometer .brdf or curve .csv file, or `sample:NAME`",
         path.display()
     )]

@@ -1,19 +1,21 @@
 //! A folder of texture maps as a document.
 //!
-//! The maps are base colour, roughness and metallic (separate, or packed as occlusion-roughness-metallic), or diffuse,
-//! specular and glossiness; a normal map adds to roughness ([`super::relief`]). Files are recognised by name
-//! ([`super::names`]) or listed in [`SETTINGS`]. All maps are resized to the base colour. The notes report which encoding
-//! was assumed, what was resized and what was left out.
+//! The maps are base colour, roughness and metallic (separate, or packed as occlusion-roughness-metallic or
+//! metallic-smoothness), or diffuse, specular and glossiness; a normal map adds to roughness ([`super::relief`]), and a clear
+//! coat lies over either. Files are recognised by name ([`super::names`]) or listed in [`SETTINGS`]. All maps are resized to
+//! the base colour. The notes report which encoding was assumed, what was resized and what was left out.
 
 mod files;
+mod locate;
 mod settings;
 
 use std::path::Path;
 
-use super::content::{ColourSpace, Content, Document, Options, name_of};
+use super::content::{Content, Document, Options, name_of};
 use super::error::DocumentError;
+use super::layers::CoatLayer;
 use super::names::Role;
-use super::picture::Picture;
+use super::picture::{Encoding, Picture};
 use super::relief;
 use super::source::{MOST_BYTES, Source};
 use super::texture::{Field, Plane, same_shape};
@@ -21,6 +23,7 @@ use crate::brdf::Space;
 use crate::materials::{Surface, Surfaces, dielectric, metallic, specular};
 
 use files::Files;
+pub(super) use locate::{Found, locate};
 pub(super) use settings::{FolderSettings, SETTINGS, Workflow};
 
 struct Reader<'a, 'b> {
@@ -57,9 +60,40 @@ impl Reader<'_, '_> {
         Ok(plane.resized(self.size.0, self.size.1))
     }
 
-    /// One channel as data.
+    /// A picture whose alpha is smoothness.
+    fn smooth(&mut self, name: &str) -> Result<Picture, DocumentError> {
+        let path = self.files.folder.join(name);
+        let bytes = self.source.read(&path, MOST_BYTES)?;
+        let picture = Picture::decode_with_alpha(&bytes, &path, self.source)?;
+        if !picture.has_alpha() {
+            let problem = "expected smoothness in the alpha channel, found no alpha; a map of its own is named \
+                           glossiness or roughness";
+            return Err(DocumentError::Picture { path, problem: problem.into() });
+        }
+        self.source.note(format!("{name}: alpha is read as smoothness (roughness = 1 - alpha)"));
+        self.source.observer.advance(1);
+        Ok(picture)
+    }
+
+    /// One channel as data, which are 0 to 1.
     fn data(&mut self, name: &str, picture: &Picture, channel: usize) -> Result<Field, DocumentError> {
+        /// By how much a sharp step may overshoot when a map was resized: Gibbs' phenomenon adds 9 %.
+        const OVERSHOOT: f32 = 0.1;
         let plane = picture.channel(channel);
+        if let Some((at, by)) = plane.outside() {
+            if by > OVERSHOOT {
+                let (x, y, value) = (at % picture.width, at / picture.width, plane.at(at));
+                return Err(DocumentError::Picture {
+                    path: self.files.folder.join(name),
+                    problem: format!(
+                        "pixel ({x}, {y}) is {value}; roughness, metallic and the like are 0 to 1 (divide a map of 0 \
+                         to 255 by 255)"
+                    ),
+                });
+            }
+            self.source
+                .note(format!("{name}: values outside 0 to 1 are clamped; the farthest is {}", plane.at(at)));
+        }
         Ok(Field::Map(self.fit(plane, name)?))
     }
 
@@ -89,12 +123,16 @@ impl Reader<'_, '_> {
         &mut self,
         name: &str,
         picture: &Picture,
-        space: ColourSpace,
+        encoding: Encoding,
     ) -> Result<[Field; 3], DocumentError> {
         if picture.has_foreign_profile() {
             self.source.note(format!("{name}: the colour profile is not applied"));
         }
-        let planes = picture.linear(space);
+        if picture.has_other_primaries() {
+            self.source
+                .note(format!("{name}: colours are converted from the primaries that the file states"));
+        }
+        let planes = picture.linear(encoding);
         let outside = planes.iter().any(|plane| !plane.is_share());
         if outside {
             self.source.note(format!(
@@ -120,14 +158,15 @@ pub(super) fn open(
             "no base colour map; expected a name such as base_color, albedo or diffuse, or [maps] in {SETTINGS}"
         )));
     };
-    let maps = files.by_role.iter().filter(|(role, _)| *role != Role::Ignored).count();
+    let read = |role: &Role| !matches!(role, Role::Ignored | Role::Unprintable);
+    let maps = files.by_role.iter().filter(|(role, _)| read(role)).count();
     source.observer.begin("reading", maps as u64);
 
     let mut reader = Reader { files, source: &mut source, size: (0, 0) };
     let picture = reader.picture(&base_name)?;
     reader.size = (picture.width, picture.height);
     let chosen = options.colour_space.or(settings.colour_space);
-    let encoding = |picture: &Picture| chosen.unwrap_or(picture.natural_space());
+    let encoding = |picture: &Picture| chosen.map_or(picture.natural_encoding(), Encoding::from);
     let how = encoding_words(encoding(&picture), chosen.is_some());
     reader.source.note(format!("{base_name}: {how}; maps other than colours are read as linear data"));
     let base = reader.colour(&base_name, &picture, encoding(&picture))?;
@@ -137,6 +176,7 @@ pub(super) fn open(
         None => None,
         Some(name) => Some(normal_variance(&mut reader, &name)?),
     };
+    let coat = coat(&mut reader, &settings)?;
     let workflow = match settings.workflow {
         Some(workflow) => workflow,
         None => workflow_of(&reader.files, &settings)?,
@@ -144,14 +184,14 @@ pub(super) fn open(
     let surfaces = match workflow {
         Workflow::MetallicRoughness => {
             let (roughness, metal) = roughness_metallic(&mut reader, &settings)?;
-            build(reader.size, space, variance, move |i| {
+            build(reader.size, space, variance, coat, move |i| {
                 let metal = metal.at(i).clamp(0.0, 1.0);
                 metallic(rgb(&base, i), [dielectric(1.5); 3], roughness.at(i).clamp(0.0, 1.0), metal)
             })
         }
         Workflow::SpecularGlossiness => {
             let (f0, gloss) = specular_glossiness(&mut reader, encoding)?;
-            build(reader.size, space, variance, move |i| {
+            build(reader.size, space, variance, coat, move |i| {
                 specular(rgb(&base, i), rgb(&f0, i), gloss.at(i).clamp(0.0, 1.0))
             })
         }
@@ -168,14 +208,17 @@ pub(super) fn open(
 }
 
 /// A note on how the colours are read, and how to change that if it is a default.
-fn encoding_words(space: ColourSpace, chosen: bool) -> String {
-    match (chosen, space) {
-        (true, ColourSpace::Srgb) => "read as sRGB, as requested".into(),
-        (true, ColourSpace::Linear) => "read as linear, as requested".into(),
-        (false, ColourSpace::Srgb) => {
+fn encoding_words(encoding: Encoding, chosen: bool) -> String {
+    match (chosen, encoding) {
+        (true, Encoding::Srgb) => "read as sRGB, as requested".into(),
+        (true, _) => "read as linear, as requested".into(),
+        (false, Encoding::Power(power)) => {
+            format!("colours are read by the gamma that the file states ({power})")
+        }
+        (false, Encoding::Srgb) => {
             format!("integer colours are read as sRGB; set colour_space in {SETTINGS} if they are linear")
         }
-        (false, ColourSpace::Linear) => {
+        (false, Encoding::Linear) => {
             format!(
                 "floating-point colours are read as linear; set colour_space in {SETTINGS} if they are sRGB"
             )
@@ -183,11 +226,12 @@ fn encoding_words(space: ColourSpace, chosen: bool) -> String {
     }
 }
 
-/// The surfaces of all pixels, widened by the slope variance of the normal map.
+/// The surfaces of all pixels, widened by the slope variance of the normal map, under the clear coat.
 fn build(
     (width, height): (usize, usize),
     space: Space,
     variance: Option<Field>,
+    coat: Option<CoatLayer>,
     surface: impl Fn(usize) -> Surface + Send + Sync + 'static,
 ) -> Surfaces {
     Surfaces::build(width, height, space, move |i| {
@@ -195,7 +239,7 @@ fn build(
         if let Some(variance) = &variance {
             surface.alpha = relief::widened(surface.alpha, variance.at(i));
         }
-        surface
+        surface.under(coat.as_ref().map(|coat| coat.at(i)).unwrap_or_default())
     })
 }
 
@@ -206,10 +250,11 @@ fn rgb(fields: &[Field; 3], pixel: usize) -> [f32; 3] {
 /// The workflow of the maps found.
 fn workflow_of(files: &Files, settings: &FolderSettings) -> Result<Workflow, DocumentError> {
     let has = |role| files.by_role.iter().any(|(r, _)| *r == role);
-    let rough = has(Role::Roughness) || has(Role::Packed) || settings.roughness.is_some();
-    match (rough, has(Role::Glossiness)) {
+    let packed = has(Role::Packed) || has(Role::MetallicSmoothness);
+    let rough = has(Role::Roughness) || packed || settings.roughness.is_some();
+    match (rough, has(Role::Glossiness) || has(Role::SpecularSmoothness)) {
         (true, false) => Ok(Workflow::MetallicRoughness),
-        (true, true) if has(Role::Metallic) || has(Role::Packed) => Ok(Workflow::MetallicRoughness),
+        (true, true) if has(Role::Metallic) || packed => Ok(Workflow::MetallicRoughness),
         (true, true) => Err(files.error(format!(
             "found both roughness and glossiness maps; set workflow = \"metallic-roughness\" or \
              \"specular-glossiness\" in {SETTINGS}"
@@ -247,7 +292,20 @@ fn roughness_metallic(
             }
         }
     }
-    for role in [Role::Specular, Role::Glossiness] {
+    if let Some(name) = reader.files.one(Role::MetallicSmoothness)? {
+        if roughness.is_some() && metal.is_some() {
+            reader.source.note(format!("{name}: not read, because its channels exist as separate maps"));
+        } else {
+            let picture = reader.smooth(&name)?;
+            if roughness.is_none() {
+                roughness = Some(inverted(reader.data(&name, &picture, 3)?));
+            }
+            if metal.is_none() {
+                metal = Some(reader.data(&name, &picture, 0)?);
+            }
+        }
+    }
+    for role in [Role::Specular, Role::Glossiness, Role::SpecularSmoothness] {
         if let Some(name) = reader.files.all(role).first() {
             reader.source.note(format!(
                 "{name}: not read; a roughness map selects the metallic workflow (set workflow in {SETTINGS} to change \
@@ -267,13 +325,22 @@ fn roughness_metallic(
 
 fn specular_glossiness(
     reader: &mut Reader<'_, '_>,
-    encoding: impl Fn(&Picture) -> ColourSpace,
+    encoding: impl Fn(&Picture) -> Encoding,
 ) -> Result<([Field; 3], Field), DocumentError> {
-    let gloss = match reader.single(Role::Glossiness)? {
+    let mut f0 = None;
+    let mut gloss = reader.single(Role::Glossiness)?;
+    if let Some(name) = reader.files.one(Role::SpecularSmoothness)? {
+        let picture = reader.smooth(&name)?;
+        let encoding = encoding(&picture);
+        f0 = Some(reader.colour(&name, &picture, encoding)?);
+        if gloss.is_none() {
+            gloss = Some(reader.data(&name, &picture, 3)?);
+        }
+    }
+    let gloss = match gloss {
         Some(gloss) => gloss,
         None => match reader.single(Role::Roughness)? {
-            Some(Field::Map(roughness)) => Field::Map(roughness.map(|r| 1.0 - r)),
-            Some(Field::Constant(roughness)) => Field::Constant(1.0 - roughness),
+            Some(roughness) => inverted(roughness),
             None => {
                 return Err(reader
                     .files
@@ -281,18 +348,51 @@ fn specular_glossiness(
             }
         },
     };
-    let f0 = match reader.files.one(Role::Specular)? {
-        Some(name) => {
+    let f0 = match (f0, reader.files.one(Role::Specular)?) {
+        (Some(f0), _) => f0,
+        (None, Some(name)) => {
             let picture = reader.picture(&name)?;
             let encoding = encoding(&picture);
             reader.colour(&name, &picture, encoding)?
         }
-        None => {
+        (None, None) => {
             reader.source.note("no specular map: reflectance at normal incidence is 0.04 everywhere".into());
             std::array::from_fn(|_| Field::Constant(dielectric(1.5)))
         }
     };
     Ok((f0, gloss))
+}
+
+/// One minus a map: roughness from smoothness.
+fn inverted(field: Field) -> Field {
+    match field {
+        Field::Map(plane) => Field::Map(plane.map(|v| 1.0 - v)),
+        Field::Constant(value) => Field::Constant(1.0 - value),
+    }
+}
+
+/// The clear coat, if there is one. A coat that two maps describe is left out: the material is there without it.
+fn coat(reader: &mut Reader<'_, '_>, settings: &FolderSettings) -> Result<Option<CoatLayer>, DocumentError> {
+    for role in [Role::Coat, Role::CoatRoughness] {
+        let several = reader.files.all(role);
+        if several.len() > 1 {
+            reader.source.note(format!(
+                "{} could each be the {} map, so no coat is printed; name one of them under [maps] in {SETTINGS}",
+                several.join(" and "),
+                role.name()
+            ));
+            return Ok(None);
+        }
+    }
+    let Some(weight) = reader.single(Role::Coat)?.or(settings.coat.map(Field::Constant)) else {
+        return Ok(None);
+    };
+    let roughness = reader.single(Role::CoatRoughness)?.or(settings.coat_roughness.map(Field::Constant));
+    let roughness = roughness.unwrap_or_else(|| {
+        reader.source.note("no map of the clear coat's roughness: the coat is smooth".into());
+        Field::Constant(0.0)
+    });
+    Ok(Some(CoatLayer { weight, roughness, f0: dielectric(1.5) }))
 }
 
 /// The slope variance of a normal map, at the size of the base colour. The window covers the same area of the document for

@@ -1,7 +1,8 @@
 //! glTF and GLB: one material of a file as a document, with its textures as they are stored.
 //!
 //! Supported: metallic-roughness with its factors, `KHR_materials_pbrSpecularGlossiness`, `KHR_materials_specular`,
-//! `KHR_materials_ior`, and normal maps (converted to roughness). Geometry is ignored: the print is the texture square,
+//! `KHR_materials_ior`, `KHR_materials_clearcoat`, and normal maps (converted to roughness). A material without light
+//! (`KHR_materials_unlit`) is printed matt. Geometry is ignored: the print is the texture square,
 //! wherever the mesh places it. A texture transform that all maps share is ignored with a note; maps with different
 //! transforms do not align and are an error.
 //! Source: glTF 2.0, sections 3.9 and appendix B.
@@ -14,22 +15,27 @@ use ::gltf::json;
 
 use super::content::{ColourSpace, Content, Document, Options, SWATCH_MM, name_of};
 use super::error::DocumentError;
+use super::layers::{CoatLayer, Layers, PbrWorkflow, build};
 use super::relief;
 use super::source::{MOST_BYTES, Source};
-use super::texture::{Field, same_shape};
+use super::texture::Field;
 use crate::brdf::Space;
-use crate::materials::{Surfaces, dielectric, metallic, specular};
+use crate::materials::dielectric;
 
 use loader::{Loaded, Loader, coloured};
 
 /// Extensions that are supported, or that do not affect reflectance.
-const READ: [&str; 5] = [
+const READ: [&str; 6] = [
+    CLEARCOAT,
     "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_specular",
     "KHR_materials_ior",
     "KHR_materials_variants",
-    "KHR_materials_unlit",
+    UNLIT,
 ];
+
+const CLEARCOAT: &str = "KHR_materials_clearcoat";
+const UNLIT: &str = "KHR_materials_unlit";
 
 pub(super) fn open(
     path: &Path,
@@ -57,6 +63,18 @@ pub(super) fn open(
         .collect();
     if !foreign.is_empty() {
         source.note(format!("{}: the file uses {}, which is ignored", path.display(), foreign.join(", ")));
+    }
+    let coloured = |primitive: &json::mesh::Primitive| {
+        let colour = |semantic: &json::validation::Checked<json::mesh::Semantic>| {
+            matches!(semantic, json::validation::Checked::Valid(json::mesh::Semantic::Colors(_)))
+        };
+        primitive.material.is_some_and(|of| of.value() == number) && primitive.attributes.keys().any(colour)
+    };
+    if root.meshes.iter().flat_map(|mesh| &mesh.primitives).any(coloured) {
+        source.note(format!(
+            "{}: the vertex colours (COLOR_0), which multiply the base colour, belong to the mesh and are ignored",
+            path.display()
+        ));
     }
     let maps = count_maps(material);
     source.observer.begin("reading", maps);
@@ -144,19 +162,6 @@ fn count_maps(material: &json::Material) -> u64 {
     maps
 }
 
-/// The parameters of a material, each a map or a constant.
-struct Layers {
-    base: [Field; 3],
-    kind: PbrWorkflow,
-    /// Slope variance of the normal map, at the size of that map.
-    variance: Option<Field>,
-}
-
-enum PbrWorkflow {
-    Metallic { roughness: Field, metal: Field, f0: [Field; 3], level: Field },
-    Specular { f0: [Field; 3], gloss: Field },
-}
-
 fn layers(
     loader: &mut Loader<'_, '_>,
     material: &json::Material,
@@ -231,11 +236,79 @@ fn layers(
             (base, PbrWorkflow::Metallic { roughness, metal, f0, level })
         }
     };
-    let variance = match &material.normal_texture {
-        None => None,
-        Some(normal) => normal_variance(loader, normal, base[0].size())?,
+    let unlit = extensions.is_some_and(|e| e.others.contains_key(UNLIT));
+    let kind = if unlit {
+        loader
+            .source
+            .note(format!("{UNLIT}: the material has no reflectance; its base colour is printed matt"));
+        let [roughness, metal, level] = [1.0, 0.0, 0.0].map(Field::Constant);
+        PbrWorkflow::Metallic { roughness, metal, f0: [0.0; 3].map(Field::Constant), level }
+    } else {
+        kind
     };
-    Ok(Layers { base, kind, variance })
+    let variance = match &material.normal_texture {
+        Some(normal) if !unlit => normal_variance(loader, normal, base[0].size())?,
+        _ => None,
+    };
+    let coat = match extensions.and_then(|e| e.others.get(CLEARCOAT)) {
+        Some(coat) if !unlit => clearcoat(loader, coat)?,
+        _ => None,
+    };
+    Ok(Layers { base, kind, variance, coat })
+}
+
+/// `KHR_materials_clearcoat`, which the `gltf` crate does not know.
+#[derive(serde::Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+struct Clearcoat {
+    clearcoat_factor: f32,
+    clearcoat_texture: Option<json::texture::Info>,
+    clearcoat_roughness_factor: f32,
+    clearcoat_roughness_texture: Option<json::texture::Info>,
+    clearcoat_normal_texture: Option<json::material::NormalTexture>,
+}
+
+impl Default for Clearcoat {
+    fn default() -> Clearcoat {
+        Clearcoat {
+            clearcoat_factor: 0.0,
+            clearcoat_texture: None,
+            clearcoat_roughness_factor: 0.0,
+            clearcoat_roughness_texture: None,
+            clearcoat_normal_texture: None,
+        }
+    }
+}
+
+/// How much the clear coat covers (red), and its roughness (green).
+fn clearcoat(
+    loader: &mut Loader<'_, '_>,
+    value: &serde_json::Value,
+) -> Result<Option<CoatLayer>, DocumentError> {
+    let coat: Clearcoat =
+        serde_json::from_value(value.clone()).map_err(|error| loader.wrong(CLEARCOAT, error.to_string()))?;
+    note_clamped(loader, "clearcoatFactor", &[coat.clearcoat_factor]);
+    note_clamped(loader, "clearcoatRoughnessFactor", &[coat.clearcoat_roughness_factor]);
+    if coat.clearcoat_factor <= 0.0 {
+        return Ok(None);
+    }
+    if coat.clearcoat_normal_texture.is_some() {
+        loader.source.note("clearcoatNormalTexture: ignored; the coat is printed smooth".into());
+    }
+    let mut field = |info: &Option<json::texture::Info>, factor, channel, name| match info {
+        Some(info) => Ok::<_, DocumentError>(
+            Field::Map(loader.load(info, name)?.picture.channel(channel)).times(factor),
+        ),
+        None => Ok(Field::Constant(factor)),
+    };
+    let weight = field(&coat.clearcoat_texture, coat.clearcoat_factor, 0, "clearcoatTexture")?;
+    let roughness = field(
+        &coat.clearcoat_roughness_texture,
+        coat.clearcoat_roughness_factor,
+        1,
+        "clearcoatRoughnessTexture",
+    )?;
+    Ok(Some(CoatLayer { weight, roughness, f0: dielectric(1.5) }))
 }
 
 /// Says which factors are not from 0 to 1, as glTF has them: what they make is cut off there.
@@ -268,70 +341,6 @@ fn normal_variance(
     loader.source.note(relief::note(&name));
     let variance = relief::slope_variance(&picture.channel(0), &picture.channel(1), normal.scale, radius);
     Ok(Some(Field::Map(variance)))
-}
-
-/// Resizes all maps to the base colour, or else to the largest map, and builds the surfaces. Also returns whether there was
-/// any map.
-fn build(
-    layers: Layers,
-    path: &Path,
-    space: Space,
-    source: &mut Source<'_>,
-) -> Result<(Surfaces, bool), DocumentError> {
-    let Layers { base, kind, variance } = layers;
-    let mut others: Vec<Option<(usize, usize)>> = vec![variance.as_ref().and_then(Field::size)];
-    match &kind {
-        PbrWorkflow::Metallic { roughness, metal, f0, level } => {
-            others.extend([roughness.size(), metal.size(), f0[0].size(), level.size()]);
-        }
-        PbrWorkflow::Specular { f0, gloss } => others.extend([f0[0].size(), gloss.size()]),
-    }
-    let largest = others.iter().flatten().copied().max_by_key(|&(w, h)| w * h);
-    let chosen = base[0].size().or(largest);
-    let (width, height) = chosen.unwrap_or((1, 1));
-    for size in others.into_iter().flatten().filter(|&size| size != (width, height)) {
-        let (w, h) = size;
-        if !same_shape(size, (width, height)) {
-            return Err(DocumentError::Field {
-                path: path.to_path_buf(),
-                field: "textures".into(),
-                problem: format!(
-                    "maps of {width} x {height} and {w} x {h} pixels; all maps need the same proportions"
-                ),
-            });
-        }
-        source.note(format!("a map of {w} x {h} pixels is resized to {width} x {height}"));
-    }
-    let fit = |field: Field| field.resized(width, height);
-    let base = base.map(fit);
-    let variance = variance.map(fit);
-    let rough =
-        move |alpha: f32, i: usize| variance.as_ref().map_or(alpha, |v| relief::widened(alpha, v.at(i)));
-    let rgb = |fields: &[Field; 3], i: usize| -> [f32; 3] {
-        std::array::from_fn(|c| fields[c].at(i).clamp(0.0, 1.0))
-    };
-    let surfaces = match kind {
-        PbrWorkflow::Metallic { roughness, metal, f0, level } => {
-            let (roughness, metal, f0, level) = (fit(roughness), fit(metal), f0.map(fit), fit(level));
-            Surfaces::build(width, height, space, move |i| {
-                let level = level.at(i).clamp(0.0, 1.0);
-                let f0 = rgb(&f0, i).map(|v| v * level);
-                let metal = metal.at(i).clamp(0.0, 1.0);
-                let mut surface = metallic(rgb(&base, i), f0, roughness.at(i).clamp(0.0, 1.0), metal);
-                surface.alpha = rough(surface.alpha, i);
-                surface
-            })
-        }
-        PbrWorkflow::Specular { f0, gloss } => {
-            let (f0, gloss) = (f0.map(fit), fit(gloss));
-            Surfaces::build(width, height, space, move |i| {
-                let mut surface = specular(rgb(&base, i), rgb(&f0, i), gloss.at(i).clamp(0.0, 1.0));
-                surface.alpha = rough(surface.alpha, i);
-                surface
-            })
-        }
-    };
-    Ok((surfaces, chosen.is_some()))
 }
 
 #[cfg(test)]

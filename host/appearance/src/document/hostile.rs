@@ -37,11 +37,16 @@ fn encoded(format: image::ImageFormat) -> Vec<u8> {
 
 /// A folder of maps whose base colour is one picture.
 fn folder(picture: &'static str, format: image::ImageFormat) -> Victim {
+    folder_of(picture, encoded(format))
+}
+
+/// A folder of maps whose base colour has these bytes.
+fn folder_of(picture: &'static str, bytes: Vec<u8>) -> Victim {
     let grey = image::GrayImage::from_fn(9, 7, |x, y| image::Luma([(20 * x + y) as u8]));
     let mut roughness = std::io::Cursor::new(Vec::new());
     grey.write_to(&mut roughness, image::ImageFormat::Png).unwrap();
     let files = vec![
-        (picture, encoded(format)),
+        (picture, bytes),
         ("roughness.png", roughness.into_inner()),
         ("nor.png", encoded(image::ImageFormat::Png)),
         (
@@ -100,6 +105,36 @@ fn glb() -> Vec<u8> {
     glb
 }
 
+fn mtlx() -> Vec<u8> {
+    br#"<materialx version="1.38"><nodegraph name="g"><constant name="c" type="color3"><input name="value"
+        type="color3" value="0.5, 0.25, 0.125"/></constant><output name="o" type="color3" nodename="c"/></nodegraph>
+        <standard_surface name="s" type="surfaceshader"><input name="base_color" type="color3" nodegraph="g"/>
+        <input name="coat" type="float" value="0.5"/></standard_surface><surfacematerial name="m" type="material">
+        <input name="surfaceshader" nodename="s"/></surfacematerial></materialx>"#
+        .to_vec()
+}
+
+/// A download: maps in a folder of a zip archive.
+fn archive() -> Vec<u8> {
+    let mut writer = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    let options = zip::write::SimpleFileOptions::default();
+    for name in ["textures/a_albedo.png", "textures/a_roughness.png", "readme.txt"] {
+        writer.start_file(name, options).unwrap();
+        let grey = image::GrayImage::from_pixel(3, 2, image::Luma([9]));
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        grey.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+        std::io::Write::write_all(&mut writer, bytes.get_ref()).unwrap();
+    }
+    writer.finish().unwrap().into_inner()
+}
+
+fn float_tiff() -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let grey = image::ImageBuffer::from_fn(9, 7, |x, _| image::Rgb([x as f32 / 9.0, 0.25, 0.5]));
+    image::DynamicImage::ImageRgb32F(grey).write_to(&mut bytes, image::ImageFormat::Tiff).unwrap();
+    bytes.into_inner()
+}
+
 fn victims() -> Vec<Victim> {
     use image::ImageFormat::*;
     let single = |file, bytes| Victim { files: vec![(file, bytes)], opened: Some(file), damaged: file };
@@ -130,6 +165,8 @@ fn victims() -> Vec<Victim> {
         folder("albedo.tif", Tiff),
         folder("albedo.hdr", Hdr),
         folder("albedo.exr", OpenExr),
+        folder("albedo.tga", Tga),
+        folder("albedo.webp", WebP),
         Victim { damaged: "roughness.png", ..folder("albedo.png", Png) },
         Victim { damaged: "nor.png", ..folder("albedo.png", Png) },
         Victim { damaged: "material.toml", ..folder("albedo.png", Png) },
@@ -144,6 +181,9 @@ fn victims() -> Vec<Victim> {
         beside("a.gltf"),
         beside("map one.png"),
         single("a.glb", glb()),
+        single("a.mtlx", mtlx()),
+        single("a.zip", archive()),
+        folder_of("albedo.tif", float_tiff()),
     ]
 }
 

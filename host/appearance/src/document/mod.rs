@@ -5,6 +5,7 @@
 //! Whatever a reader had to assume (the colour space of a map, a channel it left out, relief it turned into roughness) is
 //! recorded in [`Document::notes`].
 
+mod archive;
 mod average;
 mod content;
 mod curve;
@@ -15,10 +16,13 @@ mod gltf;
 mod gonio;
 #[cfg(test)]
 mod hostile;
+mod layers;
+mod materialx;
 mod merl;
 mod names;
 mod open;
 pub(crate) mod picture;
+mod primaries;
 mod relief;
 mod rgl;
 mod sample;

@@ -22,8 +22,18 @@ pub enum Role {
     Specular,
     /// Glossiness, one minus roughness.
     Glossiness,
+    /// Metallic in red and smoothness (glossiness) in alpha, as Unity has them.
+    MetallicSmoothness,
+    /// Specular colour, and smoothness (glossiness) in alpha, as Unity has them.
+    SpecularSmoothness,
+    /// How much of the surface a clear coat covers.
+    Coat,
+    /// Roughness of the clear coat.
+    CoatRoughness,
     /// Surface normals, of either handedness.
     Normal,
+    /// A part of the appearance that ink on paper cannot show: sheen, light from within, transmission and the like.
+    Unprintable,
     /// A map that is known not to describe reflectance: occlusion, height, a preview and the like.
     Ignored,
 }
@@ -38,14 +48,18 @@ impl Role {
             Role::Packed => "occlusion-roughness-metallic",
             Role::Specular => "specular",
             Role::Glossiness => "glossiness",
+            Role::MetallicSmoothness => "metallic-smoothness",
+            Role::SpecularSmoothness => "specular-smoothness",
+            Role::Coat => "clear coat",
+            Role::CoatRoughness => "clear coat's roughness",
             Role::Normal => "normal",
-            Role::Ignored => "other",
+            Role::Unprintable | Role::Ignored => "other",
         }
     }
 }
 
 /// Words, joined, that name a role.
-const ALIASES: [(&str, Role); 87] = [
+const ALIASES: [(&str, Role); 88] = [
     ("basecolor", Role::BaseColor),
     ("basecolour", Role::BaseColor),
     ("base", Role::BaseColor),
@@ -96,6 +110,17 @@ const ALIASES: [(&str, Role); 87] = [
     ("gloss", Role::Glossiness),
     ("glossy", Role::Glossiness),
     ("smoothness", Role::Glossiness),
+    ("metallicsmoothness", Role::MetallicSmoothness),
+    ("metalnesssmoothness", Role::MetallicSmoothness),
+    ("specularsmoothness", Role::SpecularSmoothness),
+    ("clearcoat", Role::Coat),
+    ("coat", Role::Coat),
+    ("clearcoatweight", Role::Coat),
+    ("coatweight", Role::Coat),
+    ("clearcoatroughness", Role::CoatRoughness),
+    ("coatroughness", Role::CoatRoughness),
+    ("clearcoatnormal", Role::Ignored),
+    ("coatnormal", Role::Ignored),
     ("normal", Role::Normal),
     ("normals", Role::Normal),
     ("normalmap", Role::Normal),
@@ -119,23 +144,34 @@ const ALIASES: [(&str, Role); 87] = [
     ("opacity", Role::Ignored),
     ("alpha", Role::Ignored),
     ("mask", Role::Ignored),
-    ("emissive", Role::Ignored),
-    ("emission", Role::Ignored),
-    ("emit", Role::Ignored),
-    ("anisotropy", Role::Ignored),
-    ("anisotropic", Role::Ignored),
     ("curvature", Role::Ignored),
-    ("translucency", Role::Ignored),
-    ("subsurface", Role::Ignored),
-    ("fuzz", Role::Ignored),
-    ("sheen", Role::Ignored),
-    ("clearcoat", Role::Ignored),
     ("preview", Role::Ignored),
     ("thumbnail", Role::Ignored),
     ("thumb", Role::Ignored),
 ];
 
-const LETTERS: [(&str, Role); 7] = [
+/// Words for parts of the appearance that ink cannot show. What follows one belongs to it: `sheen_color` is no base colour.
+const UNPRINTABLE: [&str; 16] = [
+    "sheen",
+    "fuzz",
+    "emissive",
+    "emission",
+    "emit",
+    "anisotropy",
+    "anisotropic",
+    "translucency",
+    "subsurface",
+    "sss",
+    "scattering",
+    "transmission",
+    "iridescence",
+    "thinfilm",
+    "thickness",
+    "diffusetransmission",
+];
+
+const LETTERS: [(&str, Role); 8] = [
+    ("b", Role::BaseColor),
     ("d", Role::BaseColor),
     ("r", Role::Roughness),
     ("m", Role::Metallic),
@@ -183,7 +219,13 @@ fn is_noise(word: &str) -> bool {
 
 /// The role that some words name: furthest right, then longest.
 fn role(words: &[String]) -> Option<Role> {
-    let words: Vec<&str> = words.iter().map(String::as_str).filter(|word| !is_noise(word)).collect();
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    // Metallic, occlusion, a mask of details and smoothness: the one name in which `map` says something.
+    let mask_map = words.windows(2).any(|two| two == ["mask", "map"]);
+    let words: Vec<&str> = words.into_iter().filter(|word| !is_noise(word)).collect();
+    if mask_map {
+        return Some(Role::MetallicSmoothness);
+    }
     let last = *words.last()?;
     if let Some(&(_, role)) = LETTERS.iter().find(|(letter, _)| *letter == last) {
         return Some(role);
@@ -191,6 +233,10 @@ fn role(words: &[String]) -> Option<Role> {
     for end in (1..=words.len()).rev() {
         for start in end.saturating_sub(4)..end {
             let run = words[start..end].concat();
+            let other = |word: &str| UNPRINTABLE.contains(&word);
+            if other(&run) || start.checked_sub(1).is_some_and(|before| other(words[before])) {
+                return Some(Role::Unprintable);
+            }
             if let Some(&(_, role)) = ALIASES.iter().find(|(alias, _)| *alias == run) {
                 return Some(role);
             }
@@ -224,7 +270,39 @@ mod tests {
     #[expect(clippy::type_complexity, reason = "a table that is easy to read")]
     fn the_names_of_each_site_are_recognised() {
         use Role::*;
-        let sites: [(&str, &[(&str, Option<Role>)]); 8] = [
+        let sites: [(&str, &[(&str, Option<Role>)]); 11] = [
+            (
+                "Fab",
+                &[
+                    ("T_tdbkabgs_2K_B", Some(BaseColor)),
+                    ("T_tdbkabgs_2K_N", Some(Normal)),
+                    ("T_tdbkabgs_2K_ORM", Some(Packed)),
+                ],
+            ),
+            (
+                "Unity",
+                &[
+                    ("Thing_AlbedoTransparency", Some(BaseColor)),
+                    ("Thing_MetallicSmoothness", Some(MetallicSmoothness)),
+                    ("Thing_SpecularSmoothness", Some(SpecularSmoothness)),
+                    ("Thing_MaskMap", Some(MetallicSmoothness)),
+                    ("Thing_mask", Some(Ignored)),
+                    ("Thing_Emission", Some(Unprintable)),
+                ],
+            ),
+            (
+                "layers of a material",
+                &[
+                    ("x_base_color", Some(BaseColor)),
+                    ("x_sheen_color", Some(Unprintable)),
+                    ("x_SheenRoughness", Some(Unprintable)),
+                    ("x_emissive_color", Some(Unprintable)),
+                    ("x_clearcoat", Some(Coat)),
+                    ("x_ClearCoatRoughness", Some(CoatRoughness)),
+                    ("x_coat_normal", Some(Ignored)),
+                    ("x_roughness", Some(Roughness)),
+                ],
+            ),
             (
                 "ambientCG",
                 &[

@@ -5,16 +5,16 @@ use std::path::Path;
 use inks::Curve;
 use observe::Observer;
 
-use super::content::{Document, Options};
+use super::content::{Document, Options, name_of};
 use super::error::DocumentError;
 use super::source::{MOST_BYTES, Source};
-use super::{curve, foil, folder, gltf, gonio, merl, rgl, sample};
+use super::{curve, foil, folder, gltf, gonio, materialx, merl, rgl, sample};
 use crate::brdf::Space;
 
 /// Opens a document: a path, or `sample:NAME`.
 ///
-/// A folder with `document.toml` is a factored document, any other folder a set of texture maps. The format of a file is
-/// recognised by its first bytes, then by its extension.
+/// A folder with `document.toml` is a factored document, any other folder a set of texture maps; a zip archive is read as the
+/// folder that it holds. The format of a file is recognised by its first bytes, then by its extension.
 pub fn open(spec: &str, options: &Options, observer: &dyn Observer) -> Result<Document, DocumentError> {
     if options.samples == 0 || options.samples > 4096 {
         return Err(DocumentError::Samples { found: options.samples });
@@ -23,14 +23,32 @@ pub fn open(spec: &str, options: &Options, observer: &dyn Observer) -> Result<Do
     if let Some(name) = spec.strip_prefix("sample:") {
         return sample::open(name, space, observer);
     }
-    let path = Path::new(spec);
+    let mut path = Path::new(spec);
     let mut source = Source::new(observer);
+    let archive = !source.is_folder(path)? && source.head(path)?.starts_with(b"PK\x03\x04");
+    if archive {
+        source.mount(path)?;
+    }
+    let found;
     if source.is_folder(path)? {
-        if path.join(foil::INDEX).is_file() {
+        if source.is_file(&path.join(foil::INDEX)) {
             return foil::open(path, source);
         }
-        note_unused_choice(options, &mut source);
-        return folder::open(path, options, space, source);
+        match folder::locate(path, &mut source)? {
+            folder::Found::Maps(folder) => {
+                note_unused_choice(options, &mut source);
+                let mut document = folder::open(&folder, options, space, source)?;
+                // The folder is named after what it holds, `textures`, the download after the material.
+                if folder != path && document.name == name_of(&folder) {
+                    document.name = name_of(path);
+                }
+                return Ok(document);
+            }
+            folder::Found::File(file) => {
+                found = file;
+                path = &found;
+            }
+        }
     }
     let head = source.head(path)?;
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
@@ -39,6 +57,9 @@ pub fn open(spec: &str, options: &Options, observer: &dyn Observer) -> Result<Do
     }
     if head.starts_with(b"glTF") || extension == "gltf" || extension == "glb" {
         return gltf::open(path, options, space, source);
+    }
+    if extension == "mtlx" {
+        return materialx::open(path, options, space, source);
     }
     note_unused_choice(options, &mut source);
     match extension.as_str() {
@@ -75,7 +96,7 @@ type Parser = fn(&[u8], &Path) -> Result<Curve, DocumentError>;
 fn note_unused_choice(options: &Options, source: &mut Source<'_>) {
     if let Some(material) = &options.material {
         source.note(format!(
-            "the choice of material `{material}` has no effect: only a glTF file can hold several materials"
+            "the choice of material `{material}` has no effect: only a glTF or MaterialX file can hold several materials"
         ));
     }
 }

@@ -1,6 +1,6 @@
-//! Decoding one image: PNG, JPEG, TIFF, Radiance HDR or OpenEXR, recognised by content and within limits.
+//! Decoding one image: PNG, JPEG, TIFF, WebP, Targa, BMP, Radiance HDR or OpenEXR, recognised by content and within limits.
 //!
-//! The contents of a file decide its format; a name that disagrees gives a note. Dimensions are checked before anything of
+//! The contents of a file decide its format; a name that disagrees gives a note. Targa has no signature: its name decides. Dimensions are checked before anything of
 //! that size is allocated. Floating-point images must be finite.
 
 use std::path::Path;
@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::content::ColourSpace;
 use super::error::DocumentError;
+use super::primaries::to_rec_709;
 use super::source::Source;
 use super::texture::Plane;
 use crate::srgb;
@@ -47,21 +48,67 @@ pub struct Picture {
     channels: usize,
     values: Values,
     foreign_profile: bool,
+    /// The power that a PNG states for its values.
+    gamma: Option<f64>,
+    /// To linear Rec. 709, if a file states other primaries.
+    matrix: Option<[[f64; 3]; 3]>,
+    /// Whether the file says that it is turned before it is shown.
+    turned: bool,
+}
+
+/// How numbers encode colours.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Encoding {
+    /// The transfer curve of IEC 61966-2-1.
+    Srgb,
+    /// Proportional to reflectance.
+    Linear,
+    /// This power of reflectance, as a file states it.
+    Power(f64),
+}
+
+impl Encoding {
+    /// The linear value of an encoded one.
+    pub fn linear(self, v: f32) -> f32 {
+        match self {
+            Encoding::Linear => v,
+            Encoding::Srgb => srgb::decode(v),
+            Encoding::Power(power) => v.max(0.0).powf((1.0 / power) as f32),
+        }
+    }
+}
+
+impl From<ColourSpace> for Encoding {
+    fn from(space: ColourSpace) -> Encoding {
+        match space {
+            ColourSpace::Srgb => Encoding::Srgb,
+            ColourSpace::Linear => Encoding::Linear,
+        }
+    }
 }
 
 impl Picture {
-    /// Decodes the bytes of a file; `path` names it in errors and notes.
+    /// Decodes the bytes of a file; `path` names it in errors and notes. Alpha, if there is any, is ignored with a note.
     pub fn decode(bytes: &[u8], path: &Path, source: &mut Source<'_>) -> Result<Picture, DocumentError> {
+        let picture = Picture::decode_with_alpha(bytes, path, source)?;
+        if picture.has_alpha() && !picture.is_opaque() {
+            source.note(format!("{}: alpha is ignored; every pixel is printed", path.display()));
+        }
+        Ok(picture)
+    }
+
+    /// Decodes the bytes of a file whose alpha is a map of its own.
+    pub fn decode_with_alpha(
+        bytes: &[u8],
+        path: &Path,
+        source: &mut Source<'_>,
+    ) -> Result<Picture, DocumentError> {
         let wrong = |problem: String| DocumentError::Picture { path: path.to_path_buf(), problem };
-        let format = if bytes.starts_with(b"#?RGBE") {
-            Some(ImageFormat::Hdr)
-        } else {
-            image::guess_format(bytes).ok()
-        };
+        let format = pictures::format(bytes, path);
         let Some((format, kind)) = format.and_then(|format| Some((format, kind(format)?))) else {
             let found = if bytes.is_empty() { "an empty file" } else { "another format" };
             return Err(wrong(format!(
-                "expected a PNG, JPEG, TIFF, OpenEXR or Radiance HDR image, found {found}"
+                "expected a PNG, JPEG, TIFF, WebP, Targa, BMP, OpenEXR or Radiance HDR image, found {found}"
             )));
         };
         if let Ok(named) = ImageFormat::from_path(path)
@@ -69,9 +116,14 @@ impl Picture {
         {
             source.note(format!("{}: read as {kind}, which it is despite its name", path.display()));
         }
-        let picture = match format {
-            ImageFormat::OpenExr => decode_exr(bytes, path)?,
-            format => {
+        let floats = match format {
+            ImageFormat::OpenExr => Some(decode_exr(bytes, path)?),
+            ImageFormat::Tiff => decode_floats(bytes, path)?,
+            _ => None,
+        };
+        let picture = match floats {
+            Some(picture) => picture,
+            None => {
                 // The decoder knows only one of the two signatures of a Radiance file.
                 let renamed = bytes.strip_prefix(b"#?RGBE").map(|rest| [b"#?RADIANCE", rest].concat());
                 decode_image(renamed.as_deref().unwrap_or(bytes), format, path)?
@@ -88,8 +140,11 @@ impl Picture {
                 values[at]
             )));
         }
-        if picture.has_alpha() && !picture.is_opaque() {
-            source.note(format!("{}: alpha is ignored; every pixel is printed", path.display()));
+        if picture.turned {
+            source.note(format!(
+                "{}: the file says that it is turned before it is shown (orientation); maps are read as they are stored",
+                path.display()
+            ));
         }
         Ok(picture)
     }
@@ -117,7 +172,8 @@ impl Picture {
         if self.channels < 3 { 1 } else { 3 }
     }
 
-    fn has_alpha(&self) -> bool {
+    /// Whether there is a channel of alpha.
+    pub fn has_alpha(&self) -> bool {
         self.channels == 2 || self.channels == 4
     }
 
@@ -154,27 +210,42 @@ impl Picture {
         }
     }
 
-    /// The default encoding of its colours: linear for floating point, sRGB for integers.
-    pub fn natural_space(&self) -> ColourSpace {
-        if self.is_float() { ColourSpace::Linear } else { ColourSpace::Srgb }
+    /// The default encoding of its colours: as the file states, or linear for floating point, sRGB for integers.
+    pub fn natural_encoding(&self) -> Encoding {
+        match self.gamma {
+            _ if self.is_float() => Encoding::Linear,
+            Some(power) => Encoding::Power(power),
+            None => Encoding::Srgb,
+        }
+    }
+
+    /// Whether its colours have other primaries than Rec. 709; they are converted.
+    pub fn has_other_primaries(&self) -> bool {
+        self.matrix.is_some()
     }
 
     /// One colour channel as linear values.
-    pub fn linear_channel(&self, channel: usize, space: ColourSpace) -> Plane {
+    fn linear_channel(&self, channel: usize, encoding: Encoding) -> Plane {
         let plane = self.channel(channel);
-        match space {
-            ColourSpace::Linear => plane,
-            ColourSpace::Srgb => plane.map(srgb::decode),
+        match encoding {
+            Encoding::Linear => plane,
+            encoding => plane.map(|v| encoding.linear(v)),
         }
     }
 
-    /// The colours as linear values.
-    pub fn linear(&self, space: ColourSpace) -> [Plane; 3] {
+    /// The colours as linear values of Rec. 709.
+    pub fn linear(&self, encoding: Encoding) -> [Plane; 3] {
         if self.colours() == 1 {
-            let grey = self.linear_channel(0, space);
+            let grey = self.linear_channel(0, encoding);
             return [grey.clone(), grey.clone(), grey];
         }
-        std::array::from_fn(|channel| self.linear_channel(channel, space))
+        let planes = [0, 1, 2].map(|channel| self.linear_channel(channel, encoding));
+        let Some(matrix) = self.matrix else { return planes };
+        matrix.map(|row| {
+            let mixed = |pixel| (0..3).map(|c| row[c] * f64::from(planes[c].at(pixel))).sum::<f64>() as f32;
+            let values = (0..self.width * self.height).into_par_iter().map(mixed).collect();
+            Plane::new(self.width, self.height, values)
+        })
     }
 }
 
@@ -188,6 +259,9 @@ fn kind(format: ImageFormat) -> Option<&'static str> {
         ImageFormat::Png => Some("PNG"),
         ImageFormat::Jpeg => Some("JPEG"),
         ImageFormat::Tiff => Some("TIFF"),
+        ImageFormat::WebP => Some("WebP"),
+        ImageFormat::Tga => Some("Targa"),
+        ImageFormat::Bmp => Some("BMP"),
         ImageFormat::Hdr => Some("Radiance HDR"),
         ImageFormat::OpenExr => Some("OpenEXR"),
         _ => None,
@@ -239,9 +313,20 @@ fn decode_image(bytes: &[u8], format: ImageFormat, path: &Path) -> Result<Pictur
     check_size(path, u64::from(width), u64::from(height), channels, most)?;
     // A damaged profile does not matter.
     let foreign_profile = opened.profile().is_some_and(|bytes| !is_srgb(&bytes));
+    let turned = opened.orientation() != image::metadata::Orientation::NoTransforms;
     let decoded = opened.decode().map_err(damaged)?;
+    let gamma = if format == ImageFormat::Png { pictures::gamma(bytes) } else { None };
     let (width, height) = (decoded.width() as usize, decoded.height() as usize);
-    let picture = |channels, values| Picture { width, height, channels, values, foreign_profile };
+    let picture = |channels, values| Picture {
+        width,
+        height,
+        channels,
+        values,
+        foreign_profile,
+        gamma,
+        matrix: None,
+        turned,
+    };
     Ok(match decoded {
         DynamicImage::ImageLuma8(p) => picture(1, Values::Eight(p.into_raw())),
         DynamicImage::ImageLumaA8(p) => picture(2, Values::Eight(p.into_raw())),
@@ -267,6 +352,31 @@ fn decode_exr(bytes: &[u8], path: &Path) -> Result<Picture, DocumentError> {
     for (width, height, channels) in pictures::exr_sizes(bytes).map_err(wrong)? {
         check_size(path, width as u64, height as u64, channels as u64, MOST_FLOATS)?;
     }
-    let pictures::Floats { width, height, channels, values } = pictures::exr(bytes).map_err(wrong)?;
-    Ok(Picture { width, height, channels, values: Values::Float(values), foreign_profile: false })
+    of_floats(pictures::exr(bytes).map_err(wrong)?, path)
+}
+
+/// A TIFF with floating-point samples; `None` if they are whole numbers.
+fn decode_floats(bytes: &[u8], path: &Path) -> Result<Option<Picture>, DocumentError> {
+    let wrong = |problem: String| DocumentError::Picture { path: path.to_path_buf(), problem };
+    let Some(file) = pictures::float_tiff(bytes).map_err(wrong)? else { return Ok(None) };
+    let (width, height) = file.size();
+    check_size(path, u64::from(width), u64::from(height), file.channels() as u64, MOST_FLOATS)?;
+    of_floats(file.decode().map_err(wrong)?, path).map(Some)
+}
+
+fn of_floats(floats: pictures::Floats, path: &Path) -> Result<Picture, DocumentError> {
+    let pictures::Floats { width, height, channels, values, primaries } = floats;
+    let matrix = primaries.as_ref().map_or(Ok(None), to_rec_709);
+    let matrix = matrix.map_err(|problem| DocumentError::Picture { path: path.to_path_buf(), problem })?;
+    let values = Values::Float(values);
+    Ok(Picture {
+        width,
+        height,
+        channels,
+        values,
+        foreign_profile: false,
+        gamma: None,
+        matrix,
+        turned: false,
+    })
 }

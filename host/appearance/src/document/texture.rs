@@ -99,6 +99,13 @@ impl Plane {
         (0..self.width * self.height).map(|pixel| self.at(pixel))
     }
 
+    /// The pixel farthest outside of 0 to 1, and by how much it lies outside; of integers there is none.
+    pub fn outside(&self) -> Option<(usize, f32)> {
+        let Codes::Float(data) = &self.codes else { return None };
+        let beyond = data.iter().map(|&v| (v - 1.0).max(-v)).enumerate();
+        beyond.filter(|&(_, by)| by > 0.0).reduce(|most, next| if next.1 > most.1 { next } else { most })
+    }
+
     /// Whether every value is within 0 to 1.
     pub fn is_share(&self) -> bool {
         let share = |v: &f32| (0.0..=1.0).contains(v);

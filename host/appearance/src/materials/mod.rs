@@ -21,7 +21,7 @@ pub use factored::Factored;
 pub use nearest::{ALPHA, DIELECTRIC, Metallic, Near, Nearest, Widths};
 pub use pixels::Materials;
 pub use reduced::{Reduced, resolution};
-pub use surface::Surface;
+pub use surface::{Coat, Coated, Surface};
 pub(crate) use surface::{dielectric, metallic, specular};
 pub use surfaces::Surfaces;
 pub use uniform::Uniform;

@@ -25,6 +25,59 @@ impl Surface {
     }
 }
 
+/// A clear coat: a dielectric film over a surface, with a lobe of its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Coat {
+    /// The part of the surface that it covers, 0..=1.
+    pub weight: f32,
+    /// Its reflectance at normal incidence; glTF fixes 0.04, the index of 1.5.
+    pub f0: f32,
+    /// Microfacet width of its lobe.
+    pub alpha: f32,
+}
+
+impl Coat {
+    /// A coat of this roughness over a part of the surface; values outside 0 to 1 are clamped.
+    pub(crate) fn new(weight: f32, roughness: f32, f0: f32) -> Coat {
+        let roughness = roughness.clamp(0.0, 1.0);
+        Coat { weight: weight.clamp(0.0, 1.0), f0: f0.clamp(0.0, 1.0), alpha: roughness * roughness }
+    }
+}
+
+/// A surface under a clear coat: `f = (1 - w + w (1 - F)^2) f_base + w F lobe`, `F` the coat's reflectance at normal incidence.
+///
+/// Light that reaches the base passes the coat's border twice, and loses `F` each time. What it loses to the coat's colour and
+/// by reflections between coat and base is left out, and so is the rise of `F` at grazing angles, as everywhere in curves of
+/// the half angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coated {
+    /// The surface below, dimmed by the coat.
+    pub(crate) base: Surface,
+    /// Reflectance of the coat's lobe at normal incidence.
+    pub(crate) f0: f32,
+    /// Microfacet width of the coat's lobe.
+    pub(crate) alpha: f32,
+}
+
+impl From<Surface> for Coated {
+    fn from(base: Surface) -> Coated {
+        Coated { base, f0: 0.0, alpha: 1.0 }
+    }
+}
+
+impl Surface {
+    /// The surface under a coat.
+    pub(crate) fn under(self, coat: Coat) -> Coated {
+        let through = 1.0 - coat.weight + coat.weight * (1.0 - coat.f0) * (1.0 - coat.f0);
+        let base = Surface {
+            diffuse: self.diffuse.map(|v| v * through),
+            f0: self.f0.map(|v| v * through),
+            alpha: self.alpha,
+        };
+        Coated { base, f0: coat.weight * coat.f0, alpha: coat.alpha }
+    }
+}
+
 /// The surface of the metallic workflow: `f0 = mix(dielectric, base, metallic)`, `diffuse = base (1 - metallic)
 /// (1 - dielectric)`, `alpha = roughness^2`; all linear, 0 to 1.
 pub(crate) fn metallic(base: [f32; 3], dielectric: [f32; 3], roughness: f32, metallic: f32) -> Surface {

@@ -12,6 +12,8 @@ use std::fmt;
 use std::sync::Arc;
 
 use super::pixels::{Materials, hash};
+use super::surface::Coated;
+#[cfg(test)]
 use super::surface::Surface;
 use crate::brdf::Space;
 
@@ -65,6 +67,8 @@ struct Packed {
     base: [f32; 3],
     f0: [f32; 3],
     position: f32,
+    /// The lobe of a clear coat: reflectance and position; a reflectance of 0 without one.
+    coat: (f32, f32),
 }
 
 /// A surface for every pixel. See the module documentation.
@@ -74,7 +78,7 @@ pub struct Surfaces {
     height: usize,
     space: Space,
     lobes: Lobes,
-    surface: Arc<dyn Fn(usize) -> Surface + Send + Sync>,
+    surface: Arc<dyn Fn(usize) -> Coated + Send + Sync>,
 }
 
 impl fmt::Debug for Surfaces {
@@ -86,29 +90,45 @@ impl fmt::Debug for Surfaces {
 impl Surfaces {
     /// Surfaces by the number of their pixel, rows from the top. Values are clamped to their ranges, NaN to the lowest value.
     /// `width` and `height` are at least 1.
-    pub(crate) fn build(
+    pub(crate) fn build<S: Into<Coated>>(
         width: usize,
         height: usize,
         space: Space,
-        surface: impl Fn(usize) -> Surface + Send + Sync + 'static,
+        surface: impl Fn(usize) -> S + Send + Sync + 'static,
     ) -> Surfaces {
         let lobes = Lobes::new(&space);
-        Surfaces { width, height, space, lobes, surface: Arc::new(surface) }
+        Surfaces { width, height, space, lobes, surface: Arc::new(move |pixel| surface(pixel).into()) }
     }
 
     #[expect(clippy::manual_clamp, reason = "clamp would keep NaN, max drops it")]
     fn packed(&self, pixel: usize) -> Packed {
-        let surface = (self.surface)(pixel);
+        let Coated { base: surface, f0: coat, alpha: coat_alpha } = (self.surface)(pixel);
         // `max` before `min`: NaN becomes 0.
         let unit = |v: f32| v.max(0.0).min(1.0);
         Packed {
             base: surface.diffuse.map(|v| unit(v) * std::f32::consts::FRAC_1_PI),
             f0: surface.f0.map(unit),
             position: Lobes::position(surface.alpha.max(LEAST_ALPHA).min(1.0)),
+            coat: match unit(coat) {
+                0.0 => (0.0, 0.0),
+                coat => (coat, Lobes::position(coat_alpha.max(LEAST_ALPHA).min(1.0))),
+            },
         }
     }
 
-    /// The surface of pixel `y * width + x`.
+    /// Adds the lobe of a coat.
+    fn add_coat(&self, (f0, position): (f32, f32), out: &mut [f32]) {
+        if f0 == 0.0 {
+            return;
+        }
+        let (below, above, s) = self.lobes.around(position);
+        for ((out, &below), &above) in out.as_chunks_mut::<3>().0.iter_mut().zip(below).zip(above) {
+            let lobe = f0 * (below + s * (above - below));
+            out.iter_mut().for_each(|v| *v += lobe);
+        }
+    }
+
+    /// The surface of pixel `y * width + x`; under a coat, what is left of it.
     #[cfg(test)]
     pub(crate) fn surface(&self, pixel: usize) -> Surface {
         let packed = self.packed(pixel);
@@ -134,16 +154,18 @@ impl Materials for Surfaces {
     }
 
     fn reflectance(&self, pixel: usize, out: &mut [f32]) {
-        let Packed { base, f0, position } = self.packed(pixel);
+        let Packed { base, f0, position, coat } = self.packed(pixel);
         let (below, above, s) = self.lobes.around(position);
         for ((out, &below), &above) in out.as_chunks_mut::<3>().0.iter_mut().zip(below).zip(above) {
             let lobe = below + s * (above - below);
             *out = std::array::from_fn(|c| base[c] + f0[c] * lobe);
         }
+        self.add_coat(coat, out);
     }
 
     fn add(&self, pixel: usize, part: f32, out: &mut [f32]) {
-        let Packed { base, f0, position } = self.packed(pixel);
+        let Packed { base, f0, position, coat } = self.packed(pixel);
+        self.add_coat((part * coat.0, coat.1), out);
         let (base, f0) = (base.map(|v| part * v), f0.map(|v| part * v));
         let (below, above, s) = self.lobes.around(position);
         for ((out, &below), &above) in out.as_chunks_mut::<3>().0.iter_mut().zip(below).zip(above) {
@@ -153,8 +175,11 @@ impl Materials for Surfaces {
     }
 
     fn key(&self, pixel: usize, _row: &mut [f32]) -> u64 {
-        let Packed { base: [a, b, c], f0: [d, e, f], position } = self.packed(pixel);
-        hash(&[a, b, c, d, e, f, position])
+        let Packed { base: [a, b, c], f0: [d, e, f], position, coat } = self.packed(pixel);
+        match coat {
+            (0.0, _) => hash(&[a, b, c, d, e, f, position]),
+            (coat, place) => hash(&[a, b, c, d, e, f, position, coat, place]),
+        }
     }
 }
 
@@ -183,6 +208,32 @@ mod tests {
                 prop_assert!((found - expected).abs() <= 2e-4 * expected + 1e-6, "{} {}", found, expected);
             }
             prop_assert!((surfaces.surface(0).alpha / alpha - 1.0).abs() < 1e-4);
+        }
+    }
+
+    /// The coat by its equation, term by term, in double precision.
+    #[test]
+    fn a_coat_is_a_second_lobe_over_a_dimmed_base() {
+        let space = Space::half_angle(48);
+        let base = Surface { diffuse: [0.05, 0.1, 0.4], f0: [0.9, 0.7, 0.3], alpha: 0.3 };
+        for (weight, roughness) in [(1.0f32, 0.2f32), (0.5, 0.6), (0.0, 0.1)] {
+            let coated = move |_| base.under(crate::materials::Coat::new(weight, roughness, 0.04));
+            let surfaces = Surfaces::build(1, 1, space.clone(), coated);
+            let mut row = vec![0.0; space.columns()];
+            surfaces.reflectance(0, &mut row);
+            let mut twice = row.clone();
+            surfaces.add(0, 1.0, &mut twice);
+            let below = space.row(&base.curve(space.angles()));
+            let w = f64::from(weight);
+            for (n, &t) in space.angles().iter().enumerate() {
+                let lobe = 0.04 * inks::ggx::lobe(t, f64::from(roughness).powi(2));
+                for c in 3 * n..3 * n + 3 {
+                    let covered = 0.96 * 0.96 * below[c] + lobe;
+                    let expected = w * covered + (1.0 - w) * below[c];
+                    assert!((f64::from(row[c]) - expected).abs() < 3e-4 * expected + 1e-6, "{weight} {n}");
+                    assert!((twice[c] - 2.0 * row[c]).abs() < 1e-5 * row[c]);
+                }
+            }
         }
     }
 

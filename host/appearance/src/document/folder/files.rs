@@ -7,9 +7,6 @@ use crate::document::error::{DocumentError, list};
 use crate::document::names::{self, Role};
 use crate::document::source::Source;
 
-/// The most directory entries that are examined.
-const MOST_FILES: usize = 10_000;
-
 /// The files of a folder by role, and all image files for error messages.
 pub(super) struct Files {
     pub(super) folder: PathBuf,
@@ -23,11 +20,9 @@ impl Files {
         settings: &FolderSettings,
         source: &mut Source<'_>,
     ) -> Result<Files, DocumentError> {
-        let io = |source| DocumentError::Io { path: folder.to_path_buf(), attempt: "list", source };
         let (mut seen, mut foreign) = (Vec::new(), Vec::new());
-        for entry in std::fs::read_dir(folder).map_err(io)?.take(MOST_FILES) {
-            let name = entry.map_err(io)?.file_name().to_string_lossy().into_owned();
-            if name.starts_with('.') {
+        for (name, is_folder) in source.list(folder)? {
+            if name.starts_with('.') || is_folder {
                 continue;
             }
             if is_picture(&name) {
@@ -36,16 +31,8 @@ impl Files {
                 foreign.push(name);
             }
         }
-        seen.sort();
-        if !foreign.is_empty() {
-            foreign.sort();
-            source.note(format!(
-                "not read: {}; save maps as PNG, JPEG, TIFF, OpenEXR or Radiance HDR",
-                list(&foreign)
-            ));
-        }
-        let stems: Vec<&str> =
-            seen.iter().map(|name| name.rsplit_once('.').map_or(&name[..], |(s, _)| s)).collect();
+        let all: Vec<&String> = seen.iter().chain(&foreign).collect();
+        let stems: Vec<&str> = all.iter().map(|name| stem(name)).collect();
         let roles = names::roles(&stems);
         let mut files = Files { folder: folder.to_path_buf(), seen: seen.clone(), by_role: Vec::new() };
         for (role, name) in settings.maps.named() {
@@ -57,14 +44,15 @@ impl Files {
             }
             files.by_role.push((role, name.to_string()));
         }
-        for (name, role) in seen.iter().zip(roles) {
-            if let Some(role) = role
+        for (name, role) in seen.iter().zip(&roles) {
+            if let Some(role) = *role
                 && settings.maps.named().all(|(named, _)| named != role)
             {
                 files.by_role.push((role, name.clone()));
             }
         }
         files.choose_normal(source);
+        files.without_foreign(&foreign, &roles[seen.len()..], source)?;
         Ok(files)
     }
 
@@ -86,6 +74,38 @@ impl Files {
                 "{drop}: not read, because the same normals are there in the other convention"
             ));
         }
+    }
+
+    /// Refuses a folder in which a map is there, by its name, in a format that is not read; what is not needed is noted.
+    fn without_foreign(
+        &self,
+        foreign: &[String],
+        roles: &[Option<Role>],
+        source: &mut Source<'_>,
+    ) -> Result<(), DocumentError> {
+        const WAY: &str = "save maps as PNG, JPEG, TIFF, WebP, OpenEXR or Radiance HDR";
+        for (name, role) in foreign.iter().zip(roles) {
+            let needed = |role: &Role| !matches!(role, Role::Ignored | Role::Unprintable);
+            if let Some(role) = role.filter(needed)
+                && self.all(role).is_empty()
+            {
+                return Err(self.error(format!(
+                    "{name} is the {} map by its name, but its format is not read; {WAY}, or rename it if it is no map",
+                    role.name()
+                )));
+            }
+        }
+        if !foreign.is_empty() {
+            source.note(format!("not read: {}; {WAY}", list(foreign)));
+        }
+        let unprintable = self.all(Role::Unprintable);
+        if !unprintable.is_empty() {
+            source.note(format!(
+                "not printed: {}; they describe what ink on paper cannot show",
+                list(&unprintable)
+            ));
+        }
+        Ok(())
     }
 
     pub(super) fn all(&self, role: Role) -> Vec<String> {
@@ -110,15 +130,27 @@ impl Files {
     }
 }
 
+/// A file's name without its ending.
+fn stem(name: &str) -> &str {
+    name.rsplit_once('.').map_or(name, |(stem, _)| stem)
+}
+
+/// Whether these names of files hold a base colour map.
+pub(super) fn has_base_colour<'n>(names: impl Iterator<Item = &'n str>) -> bool {
+    let stems: Vec<&str> =
+        names.filter(|name| is_picture(name) && !name.starts_with('.')).map(stem).collect();
+    names::roles(&stems).contains(&Some(Role::BaseColor))
+}
+
 fn is_picture(name: &str) -> bool {
-    has_extension(name, &["png", "jpg", "jpeg", "tif", "tiff", "exr", "hdr", "rgbe"])
+    has_extension(name, &["png", "jpg", "jpeg", "tif", "tiff", "exr", "hdr", "rgbe", "tga", "webp", "bmp"])
 }
 
 /// Whether a file is, by its name, an image that cannot be decoded here.
 fn is_foreign_picture(name: &str) -> bool {
     has_extension(
         name,
-        &["tga", "webp", "bmp", "gif", "dds", "psd", "ktx2", "avif", "heic", "jxl", "jp2", "svg", "tx"],
+        &["gif", "dds", "psd", "ktx2", "ktx", "avif", "heic", "jxl", "jp2", "svg", "tx", "pic"],
     )
 }
 

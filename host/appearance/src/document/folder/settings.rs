@@ -44,6 +44,12 @@ pub struct FolderSettings {
     /// Metallic if there is no map, 0 to 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub metallic: Option<f32>,
+    /// How much of the surface a clear coat covers if there is no map, 0 to 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coat: Option<f32>,
+    /// Roughness of the clear coat if there is no map, 0 to 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coat_roughness: Option<f32>,
     /// The files to read, where their names do not tell.
     #[serde(default, skip_serializing_if = "MapNames::is_empty")]
     pub maps: MapNames,
@@ -67,6 +73,14 @@ pub struct MapNames {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub glossiness: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    pub metallic_smoothness: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub specular_smoothness: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coat: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coat_roughness: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub normal: Option<String>,
 }
 
@@ -83,6 +97,10 @@ impl MapNames {
             (Role::Packed, &self.occlusion_roughness_metallic),
             (Role::Specular, &self.specular),
             (Role::Glossiness, &self.glossiness),
+            (Role::MetallicSmoothness, &self.metallic_smoothness),
+            (Role::SpecularSmoothness, &self.specular_smoothness),
+            (Role::Coat, &self.coat),
+            (Role::CoatRoughness, &self.coat_roughness),
             (Role::Normal, &self.normal),
         ]
         .into_iter()
@@ -93,7 +111,7 @@ impl MapNames {
 /// Reads `material.toml` if the folder has one.
 pub(super) fn read(folder: &Path, source: &mut Source<'_>) -> Result<FolderSettings, DocumentError> {
     let path = folder.join(SETTINGS);
-    if !path.is_file() {
+    if !source.is_file(&path) {
         return Ok(FolderSettings::default());
     }
     let text = source.read_text(&path)?;
@@ -102,7 +120,12 @@ pub(super) fn read(folder: &Path, source: &mut Source<'_>) -> Result<FolderSetti
     if let Some(size) = settings.size_mm {
         check_size_mm(size).map_err(wrong)?;
     }
-    for (key, value) in [("roughness", settings.roughness), ("metallic", settings.metallic)] {
+    for (key, value) in [
+        ("roughness", settings.roughness),
+        ("metallic", settings.metallic),
+        ("coat", settings.coat),
+        ("coat_roughness", settings.coat_roughness),
+    ] {
         if let Some(value) = value
             && !(0.0..=1.0).contains(&value)
         {

@@ -8,6 +8,8 @@ use crate::document::{ColourSpace, Content, Document, DocumentError, Options, op
 use crate::materials::{Materials, Surface, Surfaces};
 use observe::Silent;
 
+mod exports;
+
 struct Folder(tempfile::TempDir);
 
 impl Folder {

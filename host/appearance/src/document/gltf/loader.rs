@@ -2,7 +2,7 @@
 //!
 //! Images come from data URIs, from buffers, or from files in the document's folder or below; other paths are errors.
 
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 use ::gltf::json;
 use base64::Engine;
@@ -11,7 +11,7 @@ use percent_encoding::percent_decode_str;
 use crate::document::content::ColourSpace;
 use crate::document::error::DocumentError;
 use crate::document::picture::Picture;
-use crate::document::source::{MOST_BYTES, Source};
+use crate::document::source::{MOST_BYTES, Source, is_within};
 use crate::document::texture::Field;
 
 /// The placement of a map on the surface: offset, rotation, scale, set of coordinates.
@@ -88,7 +88,10 @@ impl<'a> Loader<'a, '_> {
         let Some(texture) = self.root.textures.get(index) else {
             return Err(self.wrong(field, format!("texture {index} does not exist")));
         };
-        let number = texture.source.value();
+        // WebP pictures come first: the other image is for those who cannot read them, and may be absent.
+        let webp = texture.extensions.as_ref().and_then(|e| e.others.get("EXT_texture_webp"));
+        let webp = webp.and_then(|webp| usize::try_from(webp.get("source")?.as_u64()?).ok());
+        let number = webp.unwrap_or(texture.source.value());
         // What the parser puts where there is no number. Texture extensions name another image then, of a kind that is not read.
         if number == u32::MAX as usize {
             let kinds: Vec<&str> = self
@@ -179,9 +182,7 @@ impl<'a> Loader<'a, '_> {
             return Ok((PathBuf::from(format!("{} {label}", self.path.display())), bytes));
         }
         let file = percent_decode_str(uri).decode_utf8_lossy();
-        let within =
-            Path::new(&*file).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
-        if !within || file.contains([':', '\\', '\0']) || file.is_empty() {
+        if !is_within(&file) {
             return Err(self
                 .wrong(field, format!("{label}: `{uri}` must be a file in the document's folder or below")));
         }
@@ -214,6 +215,6 @@ fn is_of_images(extension: &str) -> bool {
 }
 
 pub(super) fn coloured(picture: &Picture, factor: [f32; 3], space: ColourSpace) -> [Field; 3] {
-    let [r, g, b] = picture.linear(space);
+    let [r, g, b] = picture.linear(space.into());
     [Field::Map(r).times(factor[0]), Field::Map(g).times(factor[1]), Field::Map(b).times(factor[2])]
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::document::open;
-use crate::materials::{Materials, Surface};
+use crate::materials::{Materials, Surface, Surfaces, metallic};
 use base64::Engine;
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use observe::Silent;
@@ -198,4 +198,67 @@ fn factors_that_are_cut_off_are_noted() {
     assert!(
         !notes(r#""baseColorFactor":[1,0.5,0,1],"roughnessFactor":0.5"#).join("\n").contains("from 0 to 1")
     );
+}
+
+/// The equation of glTF's coat, term by term: factors times textures, the coat's lobe over the dimmed base.
+#[test]
+fn a_clear_coat_is_a_second_lobe() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("coat.png"), png(2, 2, |i| [if i == 3 { 255 } else { 0 }, 204, 9]))
+        .unwrap();
+    let path = folder.path().join("a.gltf");
+    let text = r#"{"asset":{"version":"2.0"},"extensionsUsed":["KHR_materials_clearcoat","KHR_materials_sheen"],
+        "images":[{"uri":"coat.png"}],"textures":[{"source":0}],"materials":[{"pbrMetallicRoughness":{
+        "baseColorFactor":[0.2,0.4,0.6,1],"metallicFactor":0,"roughnessFactor":0.9},"extensions":{
+        "KHR_materials_clearcoat":{"clearcoatFactor":0.5,"clearcoatRoughnessFactor":0.5,
+        "clearcoatTexture":{"index":0},"clearcoatRoughnessTexture":{"index":0}}}}]}"#;
+    std::fs::write(&path, text).unwrap();
+    let (read, document) = surfaces(&path, None).unwrap();
+    let base = metallic([0.2, 0.4, 0.6], [0.04; 3], 0.9, 0.0);
+    close(read.surface(0), base);
+    let mut row = vec![0.0; read.space().columns()];
+    read.reflectance(3, &mut row);
+    let below = read.space().row(&base.curve(read.space().angles()));
+    for (n, &t) in read.space().angles().iter().enumerate() {
+        // Roughness 0.5 * 0.8, so that alpha is 0.16.
+        let coat = 0.96 * 0.96 * below[3 * n] + 0.04 * inks::ggx::lobe(t, 0.16);
+        let expected = 0.5 * coat + 0.5 * below[3 * n];
+        assert!((f64::from(row[3 * n]) / expected - 1.0).abs() < 1e-3, "{n}: {} {expected}", row[3 * n]);
+    }
+    let said = document.notes.join("\n");
+    assert!(said.contains("KHR_materials_sheen") && !said.contains("KHR_materials_clearcoat"), "{said}");
+}
+
+#[test]
+fn unlit_materials_are_matt_and_vertex_colours_noted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.gltf");
+    let text = |attribute: &str| {
+        format!(
+            r#"{{"asset":{{"version":"2.0"}},"extensionsUsed":["KHR_materials_unlit"],"accessors":[],"meshes":[
+            {{"primitives":[{{"attributes":{{"{attribute}":0}},"material":0}}]}}],"materials":[{{
+            "pbrMetallicRoughness":{{"baseColorFactor":[0.2,0.4,0.6,1],"roughnessFactor":0.1}},
+            "extensions":{{"KHR_materials_unlit":{{}}}}}}]}}"#
+        )
+    };
+    std::fs::write(&path, text("COLOR_0")).unwrap();
+    let (read, document) = surfaces(&path, None).unwrap();
+    close(read.surface(0), Surface { diffuse: [0.2, 0.4, 0.6], f0: [0.0; 3], alpha: 1.0 });
+    let said = document.notes.join("\n");
+    assert!(said.contains("printed matt") && said.contains("vertex colours (COLOR_0)"), "{said}");
+    std::fs::write(&path, text("POSITION")).unwrap();
+    assert!(!surfaces(&path, None).unwrap().1.notes.join("\n").contains("COLOR_0"));
+}
+
+#[test]
+fn webp_pictures_are_read_where_the_file_names_them() {
+    let folder = tempfile::tempdir().unwrap();
+    image::RgbImage::from_pixel(2, 2, image::Rgb([200, 100, 50])).save(folder.path().join("a.webp")).unwrap();
+    let path = folder.path().join("a.gltf");
+    let text = r#"{"asset":{"version":"2.0"},"images":[{"uri":"a.webp"}],"textures":[{"extensions":{
+        "EXT_texture_webp":{"source":0}}}],"materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}]}"#;
+    std::fs::write(&path, text).unwrap();
+    let linear = |v: f32| ((v / 255.0 + 0.055) / 1.055).powf(2.4);
+    let expected = metallic([200.0, 100.0, 50.0].map(linear), [0.04; 3], 1.0, 1.0);
+    close(surfaces(&path, None).unwrap().0.surface(3), expected);
 }

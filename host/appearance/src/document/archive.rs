@@ -1,0 +1,165 @@
+//! A zip archive as a folder: a material as it was downloaded.
+//!
+//! Problem: material sites hand out zip files. They come from strangers, so nothing in them is believed.
+//! Method: files are read where they lie in the archive and nothing is written to disk. Names must stay inside; no entry may be a
+//! link, encrypted, or share its bytes with another; counts and sizes have limits, which hold for the bytes that come out,
+//! whatever the archive says. The table of contents is counted before it is read.
+//! Cost: one file at a time in memory. Limits: stored or deflated entries; what macOS adds under `__MACOSX` is left out.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
+use std::path::{Component, Path, PathBuf};
+
+use zip::ZipArchive;
+
+use super::error::DocumentError;
+use super::source::MOST_BYTES;
+
+/// The most entries.
+pub(super) const MOST_ENTRIES: usize = 10_000;
+
+/// The most bytes that come out of one archive, of all the files that are read.
+const MOST_OUT: u64 = 4 * MOST_BYTES;
+
+/// The end of an archive, and where a comment behind it may push it: its record and 16 bits of length.
+const TAIL: u64 = 22 + 0xffff;
+
+/// A zip archive whose table of contents was read.
+pub(super) struct Archive {
+    path: PathBuf,
+    zip: ZipArchive<BufReader<File>>,
+    /// The number of each file by its path inside.
+    files: BTreeMap<PathBuf, usize>,
+    left: u64,
+}
+
+impl Archive {
+    /// Opens the archive of this path.
+    pub(super) fn open(path: &Path, mut file: File) -> Result<Archive, DocumentError> {
+        let wrong = |field: &str, problem: String| DocumentError::Field {
+            path: path.to_path_buf(),
+            field: field.into(),
+            problem,
+        };
+        let broken = |error: zip::result::ZipError| wrong("zip", format!("cannot be read: {error}"));
+        let io = |source| DocumentError::Io { path: path.to_path_buf(), attempt: "read", source };
+        let many = |found| DocumentError::Large {
+            path: path.to_path_buf(),
+            field: "the number of files".into(),
+            found,
+            most: MOST_ENTRIES as u64,
+        };
+        let counted = entries(&mut file).map_err(io)?;
+        if counted > MOST_ENTRIES as u64 {
+            return Err(many(counted));
+        }
+        let mut zip = ZipArchive::new(BufReader::new(file)).map_err(broken)?;
+        if zip.len() > MOST_ENTRIES {
+            return Err(many(zip.len() as u64));
+        }
+        if zip.has_duplicate_names() || zip.has_overlapping_entries().map_err(broken)? {
+            return Err(wrong(
+                "zip",
+                "files share a name or their bytes; no honest archive does that".into(),
+            ));
+        }
+        let mut files = BTreeMap::new();
+        for number in 0..zip.len() {
+            let entry = zip.by_index_raw(number).map_err(broken)?;
+            let name = entry.name().map_err(broken)?.replace('\\', "/");
+            let inside = Path::new(&name).components().all(|part| matches!(part, Component::Normal(_)));
+            if !inside || name.contains(['\0', ':']) {
+                let shown: String =
+                    name.chars().map(|c| if c.is_control() { '?' } else { c }).take(200).collect();
+                return Err(wrong("zip", format!("`{shown}` lies outside of the archive")));
+            }
+            // The kind of a file is in the upper bits of its mode; none at all is a plain file, too.
+            let kind = entry.unix_mode().unwrap_or(0) & 0o170_000;
+            let plain = !entry.is_symlink() && (kind == 0 || kind == 0o100_000) && !entry.encrypted();
+            if plain && !entry.is_dir() && !name.ends_with('/') && !name.starts_with("__MACOSX/") {
+                files.insert(PathBuf::from(name), number);
+            }
+        }
+        Ok(Archive { path: path.to_path_buf(), zip, files, left: MOST_OUT })
+    }
+
+    /// The path inside, if the path leads into this archive.
+    pub(super) fn inside<'p>(&self, path: &'p Path) -> Option<&'p Path> {
+        path.strip_prefix(&self.path).ok()
+    }
+
+    pub(super) fn is_file(&self, inside: &Path) -> bool {
+        self.files.contains_key(inside)
+    }
+
+    pub(super) fn is_folder(&self, inside: &Path) -> bool {
+        inside.as_os_str().is_empty()
+            || self.files.keys().any(|file| file != inside && file.starts_with(inside))
+    }
+
+    /// The names in a folder, and whether each is a folder.
+    pub(super) fn list(&self, inside: &Path) -> BTreeMap<String, bool> {
+        let mut list = BTreeMap::new();
+        for file in self.files.keys() {
+            let Ok(rest) = file.strip_prefix(inside) else { continue };
+            let mut parts = rest.components();
+            if let Some(first) = parts.next() {
+                list.insert(first.as_os_str().to_string_lossy().into_owned(), parts.next().is_some());
+            }
+        }
+        list
+    }
+
+    /// The first bytes of a file, at most 16.
+    pub(super) fn head(&mut self, inside: &Path) -> std::io::Result<Vec<u8>> {
+        let number = *self.files.get(inside).ok_or(std::io::ErrorKind::NotFound)?;
+        let entry = self.zip.by_index(number).map_err(std::io::Error::other)?;
+        let mut bytes = Vec::new();
+        entry.take(16).read_to_end(&mut bytes)?;
+        Ok(bytes)
+    }
+
+    /// The bytes of a file, at most `most + 1`.
+    pub(super) fn read(&mut self, inside: &Path, most: u64) -> std::io::Result<Vec<u8>> {
+        let number = *self.files.get(inside).ok_or(std::io::ErrorKind::NotFound)?;
+        let entry = self.zip.by_index(number).map_err(std::io::Error::other)?;
+        let mut bytes = Vec::new();
+        // What the archive says about sizes is not believed.
+        entry.take(most.saturating_add(1).min(self.left + 1)).read_to_end(&mut bytes)?;
+        if bytes.len() as u64 > self.left {
+            return Err(std::io::Error::other(format!(
+                "the files of the archive hold more than {} GiB",
+                MOST_OUT >> 30
+            )));
+        }
+        self.left -= bytes.len() as u64;
+        Ok(bytes)
+    }
+}
+
+/// The most entries that any record at the end of the file states.
+fn entries(file: &mut File) -> std::io::Result<u64> {
+    let length = file.seek(SeekFrom::End(0))?;
+    file.seek(SeekFrom::Start(length.saturating_sub(TAIL + 76)))?;
+    let mut tail = Vec::new();
+    file.take(TAIL + 76).read_to_end(&mut tail)?;
+    file.seek(SeekFrom::Start(0))?;
+    let mut most = 0;
+    for (at, window) in tail.windows(4).enumerate() {
+        let number = |offset: usize, bytes: usize| {
+            let field = tail.get(at + offset..at + offset + bytes)?;
+            Some(field.iter().rev().fold(0u64, |sum, &byte| sum << 8 | u64::from(byte)))
+        };
+        let stated = match window {
+            b"PK\x05\x06" => number(10, 2).filter(|&count| count != 0xffff),
+            b"PK\x06\x06" => number(32, 8),
+            _ => None,
+        };
+        most = most.max(stated.unwrap_or(0));
+    }
+    Ok(most)
+}
+
+#[cfg(test)]
+mod tests;
