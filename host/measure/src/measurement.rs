@@ -12,7 +12,8 @@ use serde::{Deserialize, Serialize};
 use sheet::DotMap;
 
 use crate::MeasureError;
-use crate::camera::merge::{self, Frames, Shot};
+use crate::camera::frames::Frames;
+use crate::camera::merge::{self, Shot};
 use crate::camera::residual_shift::ResidualShifts;
 use crate::camera::series;
 use crate::curves::card::{self, Calibration};
@@ -118,16 +119,18 @@ pub fn measure(
         }
     };
     let frames = Frames::read(setup.photos.flat_field.as_deref(), setup.photos.dark_frame.as_deref())?;
+    let off = series::lamp_off(setup)?;
     observer.begin("reading photographs", 2 * series.iter().map(Vec::len).sum::<usize>() as u64);
     let mut scene: Option<((usize, usize), Scene)> = None;
     let mut seen = Vec::new();
     for (light, exposures) in series.into_iter().enumerate() {
         let film = exposures.iter().find_map(|e| e.exif.film_focal_mm);
         let first = exposures[0].path.clone();
-        let (radiance, shots) = merge::merge(exposures, &frames, setup.photos.linear, observer)?;
+        let (radiance, shots) =
+            merge::merge(exposures, &frames, off.as_ref(), setup.photos.linear, observer)?;
         let size = (radiance.width, radiance.height);
         if scene.is_none() {
-            scene = Some((size, Scene::new(setup, size, setup.field_of_view(film)?)?));
+            scene = Some((size, Scene::new(setup, size, setup.field_of_view(film, size)?)?));
         }
         let Some((expected, scene)) = &scene else { continue };
         if *expected != size {
