@@ -11,22 +11,39 @@ use observe::Observer;
 use serde::{Deserialize, Serialize};
 use sheet::DotMap;
 
-use crate::MeasureError;
-use crate::camera::merge::{self, Frames, Shot};
+use crate::camera::frames::Frames;
+use crate::camera::merge::{self, Shot};
 use crate::camera::residual_shift::ResidualShifts;
 use crate::camera::series;
+use crate::curves::blur;
 use crate::curves::card::{self, Calibration};
 use crate::curves::coverage;
 use crate::curves::patches::{ChartOnSample, Region};
 use crate::curves::pictures::Copy;
-use crate::curves::reduce::{self, CurveRow, Pixel, Reduced};
+use crate::curves::reduce::{self, CurveRow, Doubts, Pixel, Reduced};
+use crate::curves::{extent, gather};
 use crate::geometry::correction::{self, GeometrySample};
 use crate::geometry::measures::{self, Corrected};
 use crate::geometry::scene::Scene;
+use crate::geometry::shadow::{self, Shadow};
 use crate::setup::{Setup, Trust};
+use crate::{MeasureError, linalg};
 
 /// Pixels that correct the geometry.
 const SOLVING: usize = 6000;
+
+/// Solutions of the geometry after the first, each with the curves of the one before.
+const SHARPENED: usize = 2;
+/// Softening of ln f below which pixels are as good as points.
+const SOFT: f64 = 0.01;
+/// One of so many pixels is enough for that.
+const THINNED: usize = 3;
+/// A blur in pixels that is worth a word: below it a foil's peak keeps its height within the band.
+const OUT_OF_FOCUS: f64 = 0.8;
+/// A share of other light that is worth a word.
+const FOREIGN: f64 = 0.03;
+/// A deviation of a card's step that noise and paper explain.
+const CARD_AGREES: f64 = 0.01;
 
 /// Everything that was measured, and how.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -54,6 +71,10 @@ pub struct PhotoSeries {
     pub shots: Vec<Shot>,
     /// What the grey card says.
     pub card: Calibration,
+    /// Standard deviation of the lens' blur in pixels, by the card's edges.
+    pub blur: f64,
+    /// What the dark side of the can says, if it is in view.
+    pub shadow: Option<Shadow>,
 }
 
 /// What stood where.
@@ -118,16 +139,18 @@ pub fn measure(
         }
     };
     let frames = Frames::read(setup.photos.flat_field.as_deref(), setup.photos.dark_frame.as_deref())?;
+    let off = series::lamp_off(setup)?;
     observer.begin("reading photographs", 2 * series.iter().map(Vec::len).sum::<usize>() as u64);
     let mut scene: Option<((usize, usize), Scene)> = None;
     let mut seen = Vec::new();
     for (light, exposures) in series.into_iter().enumerate() {
         let film = exposures.iter().find_map(|e| e.exif.film_focal_mm);
         let first = exposures[0].path.clone();
-        let (radiance, shots) = merge::merge(exposures, &frames, setup.photos.linear, observer)?;
+        let (radiance, shots) =
+            merge::merge(exposures, &frames, off.as_ref(), setup.photos.linear, observer)?;
         let size = (radiance.width, radiance.height);
         if scene.is_none() {
-            scene = Some((size, Scene::new(setup, size, setup.field_of_view(film)?)?));
+            scene = Some((size, Scene::new(setup, size, setup.field_of_view(film, size)?)?));
         }
         let Some((expected, scene)) = &scene else { continue };
         if *expected != size {
@@ -142,6 +165,9 @@ pub fn measure(
             None => card::find(&radiance, setup.card.reflectance)?,
         };
         let card = card::calibrate(&radiance, steps, &setup.card, scene, light)?;
+        let blur = blur::of_card(&radiance, &card.steps);
+        let scene = &scene.clone().with_blur(blur);
+        let shadow = scene.radius().and_then(|_| shadow::look(scene, &radiance, card.scale, light));
         let irradiance = card.irradiance(scene, light);
         let copy = Copy::new(&radiance, card.scale.map(|k| irradiance / std::f64::consts::PI / k));
         let regions = match &chart {
@@ -149,12 +175,14 @@ pub fn measure(
             None => regions(setup),
         };
         let pixels =
-            regions.iter().map(|at| reduce::pixels(&radiance, scene, card.scale, light, at)).collect();
+            regions.iter().map(|at| gather::pixels(&radiance, scene, card.scale, light, at)).collect();
         let outline = correction::outline(scene, &radiance, light);
-        seen.push(SeriesRecord { series: PhotoSeries { shots, card }, copy, outline, pixels });
+        seen.push(SeriesRecord { series: PhotoSeries { shots, card, blur, shadow }, copy, outline, pixels });
     }
     observer.end();
     let Some((_, scene)) = scene else { return Err(MeasureError::Scene("no photographs".into())) };
+    let blur = linalg::median(&mut seen.iter().map(|seen| seen.series.blur).collect::<Vec<_>>());
+    let scene = scene.with_blur(blur);
     let scene =
         scene.with_slips(ResidualShifts::new(seen.iter().map(|seen| series::exposures(&seen.series.shots))));
     for (i, stack) in stacks.iter().enumerate() {
@@ -205,6 +233,70 @@ fn samples(scene: &Scene, seen: &[SeriesRecord], patches: usize) -> Vec<Geometry
         .collect()
 }
 
+/// Corrects the geometry. Pixel, lamp and the lens' blur change what pixels of one half angle show, so the curves that a first solution gives say by how
+/// much, and the next ones do without it.
+fn solve(
+    tape: &Scene,
+    patches: usize,
+    seen: &[SeriesRecord],
+    outline: &[[f64; 2]],
+    measures: &[correction::Measure],
+) -> correction::Solved {
+    let samples = samples(tape, seen, patches);
+    let mut solved = correction::solve(tape, &samples, outline, measures);
+    for _ in 0..SHARPENED {
+        let curves: Vec<extent::Logs> = (0..patches)
+            .map(|i| {
+                let pixels = seen.iter().flat_map(|seen| seen.pixels[i].iter());
+                let pixels: Vec<Pixel> = pixels.step_by(THINNED).copied().collect();
+                reduce::reduce(&solved.scene, &pixels, &Doubts::default()).curve
+            })
+            .collect();
+        let mut most = 0.0f64;
+        let sharp: Vec<GeometrySample> = samples
+            .iter()
+            .map(|s| {
+                let by = extent::softened(&solved.scene, [s.x, s.y], s.light, s.first, &curves[s.patch]);
+                most = most.max(by.abs());
+                GeometrySample { ln: s.ln - by, ..*s }
+            })
+            .collect();
+        if most < SOFT {
+            break;
+        }
+        solved = correction::solve(tape, &sharp, outline, measures);
+    }
+    solved
+}
+
+/// What light besides the lamp's makes uncertain, as the card and the dark side of the can tell.
+fn light_doubts(seen: &[SeriesRecord]) -> Doubts {
+    let most = |of: &dyn Fn(&SeriesRecord) -> f64| seen.iter().map(of).fold(0.0, f64::max);
+    let bright = most(&|seen| {
+        let worst = seen.series.card.deviation[0].iter().fold(0.0f64, |most, d| most.max(d.abs()));
+        // Below what paper and noise do, the step agrees.
+        if worst > CARD_AGREES { worst } else { 0.0 }
+    });
+    let dark = |c: usize| {
+        let over = |seen: &SeriesRecord| seen.series.card.deviation[1][c].abs();
+        most(&|seen| {
+            if over(seen) > CARD_AGREES {
+                over(seen) * seen.series.card.darkest / std::f64::consts::PI
+            } else {
+                0.0
+            }
+        })
+    };
+    Doubts {
+        scenes: Vec::new(),
+        card: most(&|seen| seen.series.card.error).hypot(0.005).hypot(bright),
+        card_foreign: std::array::from_fn(dark),
+        foreign: std::array::from_fn(|c| {
+            most(&|seen| seen.series.shadow.as_ref().map_or(0.0, |shadow| shadow.level[c]))
+        }),
+    }
+}
+
 fn finish(
     setup: &Setup,
     tape: &Scene,
@@ -216,7 +308,7 @@ fn finish(
     let shots: Vec<&[Shot]> = seen.iter().map(|seen| &*seen.series.shots).collect();
     let measures = measures::measures(setup, &shots);
     let outline: Vec<[f64; 2]> = seen.iter().flat_map(|seen| seen.outline.iter().copied()).collect();
-    let solved = correction::solve(tape, &samples(tape, &seen, patches.len()), &outline, &measures);
+    let solved = solve(tape, patches.len(), &seen, &outline, &measures);
     measures::check(setup, tape, &outline, &measures, &solved)?;
     observer.end();
     let trusted = setup.geometry == Trust::Known;
@@ -229,11 +321,16 @@ fn finish(
         seen.iter().enumerate().map(factor).collect()
     };
     let factors = scales(&scene);
-    let doubts: Vec<(Scene, Vec<f64>)> = if trusted {
+    let scenes: Vec<(Scene, Vec<f64>)> = if trusted {
         Vec::new()
     } else {
         let doubtful = solved.uncertain.iter().map(|column| correction::apply(tape, &measures, column));
+        // As far as pixels deviate as before, the tape may have been right.
+        let kept = (solved.misfit / solved.before.max(1e-9)).min(1.0);
+        let back: Vec<f64> = solved.moved.iter().map(|moved| moved * (1.0 - kept)).collect();
+        let back = std::iter::once(correction::apply(tape, &measures, &back));
         doubtful
+            .chain(back)
             .map(|other| {
                 let relative = scales(&other).iter().zip(&factors).map(|(a, b)| a / b).collect();
                 (other, relative)
@@ -244,13 +341,13 @@ fn finish(
         seen.series.card.scale = seen.series.card.scale.map(|k| k * factor);
         seen.pixels.iter_mut().flatten().for_each(|pixel| pixel.value = pixel.value.map(|v| v * factor));
     }
+    let doubts = Doubts { scenes, ..light_doubts(&seen) };
     observer.begin("making curves", patches.len() as u64);
     let mut stacks = Vec::new();
     let mut used = Vec::new();
     for (i, stack) in patches.iter().enumerate() {
         let pixels: Vec<Pixel> = seen.iter().flat_map(|seen| seen.pixels[i].iter().copied()).collect();
-        let error = seen.iter().map(|seen| seen.series.card.error).fold(0.0, f64::max);
-        let Reduced { rows, used: of_stack } = reduce::reduce(&scene, &pixels, &doubts, error.hypot(0.005));
+        let Reduced { rows, used: of_stack, .. } = reduce::reduce(&scene, &pixels, &doubts);
         used.extend(of_stack);
         stacks.push(MeasuredStack { stack: stack.to_string(), rows });
         observer.advance(1);
@@ -281,9 +378,59 @@ fn finish(
         stacks,
         again: Vec::new(),
     };
+    let light = light_advice(setup, &scene, &measurement);
     measurement.again = advice(&measurement);
+    measurement.again.extend(light);
     measurement.again.iter().for_each(|line| observer.note(line));
     Ok(Taken { measurement, pictures })
+}
+
+/// What to do about a lens that blurs.
+fn blurred(blur: f64, lamp: usize) -> Option<String> {
+    (blur > OUT_OF_FOCUS).then(|| {
+        format!(
+            "lamp {lamp}: the card's edges are blurred by {blur:.1} pixels, so the lens is out of focus or the camera shook: focus on the card, and \
+             close the aperture to f/8"
+        )
+    })
+}
+
+/// What the dark side of the can says of the light.
+fn light_advice(setup: &Setup, scene: &Scene, measurement: &Measurement) -> Vec<String> {
+    let mut said = Vec::new();
+    for (i, series) in measurement.series.iter().enumerate() {
+        let Some(shadow) = &series.shadow else { continue };
+        let light = series.card.irradiance(scene, i);
+        let mut worst: Option<(f64, &str)> = None;
+        for stack in &measurement.stacks {
+            let rows = stack.rows.iter().filter(|row| row.kind == reduce::SampleOrigin::Measured);
+            for row in rows.filter(|row| row.theta_deg < 60.0) {
+                let shares = (0..3).map(|c| shadow.level[c] / light / row.rgb[c].max(1e-9));
+                let share = shares.fold(0.0, f64::max);
+                if worst.is_none_or(|worst| share > worst.0) {
+                    worst = Some((share, &stack.stack));
+                }
+            }
+        }
+        if let Some((share, stack)) = worst.filter(|worst| worst.0 > FOREIGN) {
+            said.push(format!(
+                "lamp {}: other light than the lamp's is on the can or strays in the lens: its dark side shows {:.0} % of what {stack} reflects where \
+                 it is darkest; cover the table with black cloth, darken the room, and give a photograph with the lamp off (photos.lamp_off)",
+                i + 1,
+                100.0 * share
+            ));
+        }
+        let given = setup.light[i].diameter_mm;
+        if shadow.lamp_mm > 2.0 * given && given < shadow.lamp_mm {
+            said.push(format!(
+                "lamp {}: the lamp is about {:.0} mm wide, as the edge of the can's dark side shows, and the setup file says {given:.0}: correct \
+                 light.diameter_mm, or use a smaller lamp",
+                i + 1,
+                shadow.lamp_mm
+            ));
+        }
+    }
+    said
 }
 
 /// What a second try should do otherwise, as each step judges it.
@@ -293,6 +440,7 @@ fn advice(measurement: &Measurement) -> Vec<String> {
         let clipped = measurement.stacks.iter().filter(|stack| coverage::is_clipped(&stack.rows));
         let clipped: Vec<&str> = clipped.map(|stack| &*stack.stack).collect();
         again.extend(series.card.advice(i + 1));
+        again.extend(blurred(series.blur, i + 1));
         again.extend(series::advice(&series.shots, i + 1, &clipped));
     }
     again.extend(measurement.stacks.iter().flat_map(|stack| coverage::advice(&stack.stack, &stack.rows)));

@@ -180,6 +180,8 @@ pub struct Photos {
     pub flat_field: Option<PathBuf>,
     /// Photograph with the lens covered, beside the setup file.
     pub dark_frame: Option<PathBuf>,
+    /// Photograph with the lamp off and all else as it was, beside the setup file.
+    pub lamp_off: Option<PathBuf>,
 }
 
 fn up() -> [f64; 3] {
@@ -220,7 +222,9 @@ impl Setup {
     pub fn read(path: &Path) -> Result<Setup, MeasureError> {
         let mut setup = parsed(path, "a setup file", Setup::parse)?;
         let beside = path.parent().unwrap_or(Path::new(""));
-        let files = [&mut setup.photos.flat_field, &mut setup.photos.dark_frame, &mut setup.sample.chart];
+        let photos = &mut setup.photos;
+        let files =
+            [&mut photos.flat_field, &mut photos.dark_frame, &mut photos.lamp_off, &mut setup.sample.chart];
         for file in files.into_iter().flatten() {
             *file = beside.join(&*file);
         }
@@ -372,11 +376,17 @@ impl Setup {
         format!("photographs of the print {sample}, {lamps}, three-step grey card in the picture{note}")
     }
 
-    /// The field of view across the picture in radians.
-    pub(crate) fn field_of_view(&self, film_focal_mm: Option<f64>) -> Result<f64, MeasureError> {
-        // Film is 36 mm wide.
+    /// The field of view across a picture of this size in radians.
+    pub(crate) fn field_of_view(
+        &self,
+        film_focal_mm: Option<f64>,
+        (width, height): (usize, usize),
+    ) -> Result<f64, MeasureError> {
+        // Equivalents of 35 mm film are by the diagonal (CIPA DC-008), 43.27 mm of 36 x 24, whatever the picture's shape.
+        let (width, height) = (width as f64, height as f64);
+        let across = 36f64.hypot(24.0) * width / width.hypot(height);
         let angle = self.camera.field_of_view_deg.map(|degrees| degrees * PI / 180.0);
-        angle.or(film_focal_mm.map(|focal| 2.0 * (18.0 / focal).atan())).ok_or_else(|| {
+        angle.or(film_focal_mm.map(|focal| 2.0 * (0.5 * across / focal).atan())).ok_or_else(|| {
             MeasureError::Scene(
                 "the photographs do not say the focal length; add camera.field_of_view_deg to the setup file"
                     .into(),
@@ -449,5 +459,18 @@ stack = "MS+C"
             let error = Setup::parse(&CAN.replace(from, to)).unwrap_err();
             assert!(error.contains(named), "{to}: {error}");
         }
+    }
+
+    /// 144 mm across a film of 24 mm is 9.53 degrees by hand; 4:3 is 34.6 mm across.
+    #[test]
+    fn focal_lengths_for_film_are_by_the_diagonal() {
+        let setup = Setup::parse(&CAN.replace("field_of_view_deg = 14.0", "")).unwrap();
+        for (size, focal, degrees) in
+            [((900, 1350), 144.0, 9.53), ((1350, 900), 144.0, 14.25), ((4000, 3000), 50.0, 38.18)]
+        {
+            let found = setup.field_of_view(Some(focal), size).unwrap().to_degrees();
+            assert!((found - degrees).abs() < 0.01, "{size:?}: {found}");
+        }
+        assert!(setup.field_of_view(None, (4, 3)).is_err());
     }
 }

@@ -22,6 +22,16 @@ const STRANGE: f64 = 0.15;
 const CLEAR: f64 = 6.0;
 /// Weight of standing still, in squared differences per squared pixel: without edges a shift cannot be seen.
 const STILL: f64 = 0.1;
+/// What is added to light for a second opinion, in parts of what is added for the first.
+const MORE: f32 = 4.0;
+/// Steps of the method.
+const ROUNDS: usize = 12;
+/// Parts of a picture along a side that are left out one by one.
+const PARTS: usize = 6;
+/// A difference of logarithms between neighbours in an even place.
+const EVEN: f64 = 0.15;
+/// Places that tell a white balance.
+const BALANCED: usize = 150;
 
 /// The light of each block of a small copy.
 pub(crate) struct Tones {
@@ -34,6 +44,9 @@ pub(crate) struct Tones {
     least: Vec<f32>,
     /// Light that noise does not hide.
     floor: f32,
+    /// The light of each channel, and what noise does not hide of it.
+    channels: Vec<[f32; 3]>,
+    floors: [f32; 3],
 }
 
 /// How a photograph compares with another.
@@ -41,6 +54,12 @@ pub(crate) struct Tones {
 pub(crate) struct Match {
     /// What is at x in the first is at x + shift in the second, in pixels of the photographs.
     pub(crate) shift: [f64; 2],
+    /// Standard error of the shift.
+    pub(crate) shift_error: [f64; 2],
+    /// Logarithms of red and of blue over green in the second, against those in the first.
+    pub(crate) balance: [f64; 2],
+    /// Standard errors of the two.
+    pub(crate) balance_error: [f64; 2],
     /// Logarithm of the light of the second over the first.
     pub(crate) ratio: f64,
     /// Standard error of the ratio.
@@ -76,8 +95,22 @@ impl Tones {
         let certain = CERTAIN * CERTAIN / blocks;
         let value = 0.5 * (certain * gain + (certain * gain * certain * gain + 4.0 * certain * read).sqrt());
         let value = value.max(0.004 * white[1].min(65_535.0));
-        let floor = (0..3).map(|c| response.linear(c, value / 3.0)).sum::<f32>() / time;
-        Tones { width: probe.width, height: probe.height, factor: probe.factor, light, least, floor }
+        let floors = std::array::from_fn(|c| response.linear(c, value / 3.0) / time);
+        let channels = probe
+            .mean
+            .iter()
+            .map(|mean| std::array::from_fn(|c| response.linear(c, mean[c]) / time))
+            .collect();
+        Tones {
+            width: probe.width,
+            height: probe.height,
+            factor: probe.factor,
+            light,
+            least,
+            floor: floors.iter().sum(),
+            channels,
+            floors,
+        }
     }
 
     fn halved(&self) -> Tones {
@@ -92,7 +125,8 @@ impl Tones {
                 .collect()
         };
         let (light, least) = (pooled(&self.light), pooled(&self.least));
-        Tones { width, height, factor: 2 * self.factor, light, least, floor: self.floor }
+        let (factor, floor, floors) = (2 * self.factor, self.floor, self.floors);
+        Tones { width, height, factor, light, least, floor, channels: Vec::new(), floors }
     }
 
     /// The logarithm of light with a little added, softened so that edges are wider than a step of the method.
@@ -118,15 +152,60 @@ impl Tones {
         let scale = copies.0.factor as f64 / self.factor as f64;
         let mut shift = search(&copies.0.logs(little), &copies.1.logs(little)).map(|d| d * scale);
         let mut ratio = 0.0;
-        for round in 0..12 {
-            let step = a.step(&b, shift, ratio, round);
-            shift = [shift[0] + step[0], shift[1] + step[1]];
-            ratio += step[2];
-            if step[0].abs() + step[1].abs() < 1e-4 {
-                break;
+        a.converge(&b, &mut shift, &mut ratio, 0);
+        let error = a.shift_error(&b, shift, ratio);
+        // Sensors cut noise off at zero, which moves the edges of what is dark; how far depends on what is added to it.
+        let (mut other_shift, mut other_ratio) = (shift, ratio);
+        self.logs(MORE * little).converge(&other.logs(MORE * little), &mut other_shift, &mut other_ratio, 3);
+        let error: [f64; 2] = std::array::from_fn(|axis| {
+            self.factor as f64 * error[axis].hypot(other_shift[axis] - shift[axis])
+        });
+        let [red, blue] = self.balance(other, &a, shift);
+        Match {
+            shift_error: error,
+            balance: [red.0, blue.0],
+            balance_error: [red.1, blue.1],
+            ..self.judge(other, (&a, &b), little, shift)
+        }
+    }
+
+    /// How red and blue over green differ in even places that noise does not hide; 0 where there are too few.
+    fn balance(&self, other: &Tones, logs: &Logs, shift: [f64; 2]) -> [(f64, f64); 2] {
+        let mut found: [Vec<f64>; 3] = Default::default();
+        for y in 1..self.height as i64 - 1 {
+            for x in 1..self.width as i64 - 1 {
+                let (u, v) = ((x as f64 + shift[0]).round(), (y as f64 + shift[1]).round());
+                if u < 0.0 || v < 0.0 || u >= self.width as f64 || v >= self.height as f64 {
+                    continue;
+                }
+                let (i, j) = (y as usize * self.width + x as usize, v as usize * self.width + u as usize);
+                let here = logs.at(x, y);
+                let even = [(1, 0), (-1, 0), (0, 1), (0, -1)]
+                    .iter()
+                    .all(|(k, l)| (logs.at(x + k, y + l) - here).abs() < EVEN);
+                if !even || other.light[j].is_nan() {
+                    continue;
+                }
+                // The longer exposure's neighbours choose: a place's own noise would choose what is too bright in it.
+                let ln = |c: usize| {
+                    let near = [i - 1, i + 1, i - self.width, i + self.width];
+                    let level = near.iter().map(|&i| self.channels[i][c]).sum::<f32>() / 4.0;
+                    let (a, b) = (self.channels[i][c], other.channels[j][c]);
+                    let clear = (CLEAR as f32) * self.floors[c].max(other.floors[c]);
+                    (level > clear && a > 0.0 && b > 0.0).then(|| f64::from((b / a).ln()))
+                };
+                found.iter_mut().enumerate().for_each(|(c, found)| found.extend(ln(c)));
             }
         }
-        self.judge(other, (&a, &b), little, shift)
+        // Of each channel the median, which the logarithm of noise does not move; its standard error is 1.25 times the mean's.
+        let [red, green, blue] = found.map(|found| {
+            let (middle, width) = spread(&found);
+            (found.len() >= BALANCED).then(|| (middle, 1.25 * width / (found.len() as f64).sqrt()))
+        });
+        let over = |colour: Option<(f64, f64)>| {
+            colour.zip(green).map_or((0.0, 0.0), |(a, b)| (a.0 - b.0, a.1.hypot(b.1)))
+        };
+        [over(red), over(blue)]
     }
 
     /// What is left of the differences after the shift.
@@ -172,7 +251,7 @@ impl Tones {
         let plain = |l: f64| (l.exp() - f64::from(little)).max(1e-30).ln();
         let smooth: Vec<(f64, f64)> = all
             .iter()
-            .filter(|d| d.2 < 0.15 && d.0 > clear && d.0 + d.1 > clear)
+            .filter(|d| d.2 < EVEN && d.0 > clear && d.0 + d.1 > clear)
             .map(|d| (d.0, plain(d.0 + d.1) - plain(d.0)))
             .collect();
         let differences: Vec<f64> = smooth.iter().map(|d| d.1).collect();
@@ -191,6 +270,9 @@ impl Tones {
         let strange = told.iter().filter(|d| (d.1 - ratio).abs() > doubt + d.2).count() + broken;
         Match {
             shift: shift.map(|d| d * self.factor as f64),
+            shift_error: [0.0; 2],
+            balance: [0.0; 2],
+            balance_error: [0.0; 2],
             ratio,
             error: width / (near.len().max(1) as f64).sqrt(),
             bend,
@@ -222,9 +304,48 @@ impl Logs {
         if v < 1e-6 { row(0) } else { row(0) * (1.0 - v) + row(1) * v }
     }
 
+    /// Steps until the shift stands.
+    fn converge(&self, other: &Logs, shift: &mut [f64; 2], ratio: &mut f64, from: usize) {
+        for round in from..ROUNDS {
+            let step = self.step(other, *shift, *ratio, round);
+            *shift = [shift[0] + step[0], shift[1] + step[1]];
+            *ratio += step[2];
+            if step[0].abs() + step[1].abs() < 1e-4 {
+                break;
+            }
+        }
+    }
+
     /// One step of Gauss and Newton: changes of shift and ratio that explain the differences best.
     fn step(&self, other: &Logs, shift: [f64; 2], ratio: f64, round: usize) -> [f64; 3] {
-        let (mut a, mut b) = ([0.0f64; 9], [-STILL * shift[0], -STILL * shift[1], 0.0]);
+        let all = self
+            .sums(other, shift, ratio, round)
+            .iter()
+            .fold(Sum::still(shift), |all, part| all.plus(part, 1.0));
+        let [x, y, ratio] = all.solved().unwrap_or_default();
+        [x.clamp(-2.0, 2.0), y.clamp(-2.0, 2.0), ratio]
+    }
+
+    /// The standard error of a shift by the jackknife: parts of the picture are left out one by one. It holds what edges of
+    /// clipped places and noise do, of which least squares know nothing.
+    fn shift_error(&self, other: &Logs, shift: [f64; 2], ratio: f64) -> [f64; 2] {
+        let parts = self.sums(other, shift, ratio, usize::MAX);
+        let all = parts.iter().fold(Sum::still(shift), |all, part| all.plus(part, 1.0));
+        let without: Vec<[f64; 3]> = parts
+            .iter()
+            .filter(|part| part.normal[8] > 0.0)
+            .filter_map(|part| all.plus(part, -1.0).solved())
+            .collect();
+        let n = without.len().max(1) as f64;
+        std::array::from_fn(|axis| {
+            let mean = without.iter().map(|d| d[axis]).sum::<f64>() / n;
+            (without.iter().map(|d| (d[axis] - mean).powi(2)).sum::<f64>() * (n - 1.0) / n).sqrt()
+        })
+    }
+
+    /// The normal equations of each part of the picture.
+    fn sums(&self, other: &Logs, shift: [f64; 2], ratio: f64, round: usize) -> Vec<Sum> {
+        let mut parts = vec![Sum::default(); PARTS * PARTS];
         let limit = if round < 3 { 1.5 } else { 0.5 };
         for y in 1..self.height as i64 - 1 {
             for x in 1..self.width as i64 - 1 {
@@ -240,19 +361,43 @@ impl Logs {
                 {
                     continue;
                 }
+                let (column, row) = (x as usize * PARTS / self.width, y as usize * PARTS / self.height);
+                let part = &mut parts[row * PARTS + column];
                 for i in 0..3 {
                     for j in 0..3 {
-                        a[3 * i + j] += g[i] * g[j];
+                        part.normal[3 * i + j] += g[i] * g[j];
                     }
-                    b[i] -= g[i] * difference;
+                    part.right[i] -= g[i] * difference;
                 }
             }
         }
-        a[0] += STILL;
-        a[4] += STILL;
-        let Some(factors) = Cholesky::new(&a, 3) else { return [0.0; 3] };
-        let x = factors.solve(&b);
-        [x[0].clamp(-2.0, 2.0), x[1].clamp(-2.0, 2.0), x[2]]
+        parts
+    }
+}
+
+/// Normal equations of a shift and a ratio.
+#[derive(Clone, Copy, Default)]
+struct Sum {
+    normal: [f64; 9],
+    right: [f64; 3],
+}
+
+impl Sum {
+    /// A camera stands still where nothing says otherwise.
+    fn still(shift: [f64; 2]) -> Sum {
+        let normal = [STILL, 0.0, 0.0, 0.0, STILL, 0.0, 0.0, 0.0, 0.0];
+        Sum { normal, right: [-STILL * shift[0], -STILL * shift[1], 0.0] }
+    }
+
+    fn plus(mut self, other: &Sum, factor: f64) -> Sum {
+        self.normal.iter_mut().zip(other.normal).for_each(|(a, b)| *a += factor * b);
+        self.right.iter_mut().zip(other.right).for_each(|(a, b)| *a += factor * b);
+        self
+    }
+
+    fn solved(&self) -> Option<[f64; 3]> {
+        let x = Cholesky::new(&self.normal, 3)?.solve(&self.right);
+        Some([x[0], x[1], x[2]])
     }
 }
 
@@ -302,7 +447,8 @@ mod tests {
                 [(light * exposure * 60_000.0).clamp(0.0, 65_535.0) as u16; 3]
             })
             .collect();
-        let probe = Probe::new(&Photo { width, height, values: Values::Sixteen(values) });
+        let photo = Photo { width, height, values: Values::Sixteen(values) };
+        let probe = Probe::new(&photo, &photo);
         Tones::new(&probe, &Response::Linear, Noise { gain: 1.0, read: 4.0 }, [65_535.0; 3], exposure)
     }
 

@@ -22,11 +22,11 @@ pub(crate) struct Probe {
     pub(crate) height: usize,
     /// Pixels of the photograph along a side of a block.
     pub(crate) factor: usize,
-    /// Mean of each block.
+    /// Mean of each block after the frames.
     pub(crate) mean: Vec<[f32; 3]>,
-    /// Largest value of each block.
+    /// Largest raw value of each block.
     pub(crate) most: Vec<[f32; 3]>,
-    /// The brightest value of each channel, and how many pixels have it.
+    /// The brightest raw value of each channel, and how many pixels have it.
     pub(crate) top: [(f32, usize); 3],
     /// The largest value that the file's kind can hold.
     pub(crate) limit: f32,
@@ -35,7 +35,8 @@ pub(crate) struct Probe {
 }
 
 impl Probe {
-    pub(crate) fn new(photo: &Photo) -> Probe {
+    /// `raw` is the photograph as its file has it, `photo` what the frames made of it.
+    pub(crate) fn new(raw: &Photo, photo: &Photo) -> Probe {
         let factor = photo.width.div_ceil(ACROSS).max(1);
         let (width, height) = ((photo.width / factor).max(1), (photo.height / factor).max(1));
         let (mut mean, mut most) = (vec![[0.0f32; 3]; width * height], vec![[f32::MIN; 3]; width * height]);
@@ -46,20 +47,20 @@ impl Probe {
             for x in 0..photo.width {
                 let block = row.filter(|_| x / factor < width).map(|row| row + x / factor);
                 for c in 0..3 {
-                    let value = photo.at(3 * (y * photo.width + x) + c);
+                    let value = raw.at(3 * (y * photo.width + x) + c);
                     if value > top[c].0 {
                         top[c] = (value, 1);
                     } else if value == top[c].0 {
                         top[c].1 += 1;
                     }
                     if let Some(block) = block {
-                        mean[block][c] += share * value;
+                        mean[block][c] += share * photo.at(3 * (y * photo.width + x) + c);
                         most[block][c] = most[block][c].max(value);
                     }
                 }
             }
         }
-        let limit = match photo.values {
+        let limit = match raw.values {
             Values::Eight(_) => 255.0,
             Values::Sixteen(_) => 65_535.0,
             Values::Float(_) => f32::INFINITY,
@@ -153,6 +154,10 @@ mod tests {
             - 6.0
     }
 
+    fn probe(photo: &Photo) -> Probe {
+        Probe::new(photo, photo)
+    }
+
     fn ramp(gain: f32, read: f32) -> Photo {
         let (width, height, mut state) = (600, 200, 7u64);
         let values = (0..width * height)
@@ -167,15 +172,14 @@ mod tests {
 
     #[test]
     fn a_known_noise_is_found() {
-        let probe = Probe::new(&ramp(0.5, 9000.0));
-        let white = white(&[probe]);
+        let white = white(&[probe(&ramp(0.5, 9000.0))]);
         assert_eq!(white, [50_000.0; 3]);
-        let noise = Noise::estimate(&[Probe::new(&ramp(0.5, 9000.0))], white[1]);
+        let noise = Noise::estimate(&[probe(&ramp(0.5, 9000.0))], white[1]);
         assert!(
             (noise.gain / 0.5 - 1.0).abs() < 0.1 && (noise.read / 9000.0 - 1.0).abs() < 0.15,
             "{noise:?}"
         );
-        let quiet = Noise::estimate(&[Probe::new(&ramp(0.0, 0.0))], 65_535.0);
+        let quiet = Noise::estimate(&[probe(&ramp(0.0, 0.0))], 65_535.0);
         assert!(quiet.read > 0.0 && quiet.gain < 1.0, "{quiet:?}");
     }
 
@@ -183,6 +187,6 @@ mod tests {
     fn without_a_pile_the_limit_is_that_of_the_file() {
         let photo =
             Photo { width: 4, height: 4, values: Values::Sixteen((0..48).map(|i| i * 900).collect()) };
-        assert_eq!(white(&[Probe::new(&photo)]), [65_535.0; 3]);
+        assert_eq!(white(&[probe(&photo)]), [65_535.0; 3]);
     }
 }

@@ -170,13 +170,17 @@ mod tests {
         Photo { width, height, values: Values::Eight(values) }
     }
 
+    fn probe(photo: &Photo) -> Probe {
+        Probe::new(photo, photo)
+    }
+
     #[test]
     fn known_responses_are_recovered() {
         let srgb = |l: f64| if l <= 0.003_130_8 { 12.92 * l } else { 1.055 * l.powf(1.0 / 2.4) - 0.055 };
         let curves: [&dyn Fn(f64) -> f64; 3] = [&srgb, &|l: f64| l.powf(0.5), &|l: f64| l];
         for (which, curve) in curves.into_iter().enumerate() {
             let exposures = [0.25, 1.0, 4.0, 16.0];
-            let probes: Vec<Probe> = exposures.iter().map(|&t| Probe::new(&taken(curve, t))).collect();
+            let probes: Vec<Probe> = exposures.iter().map(|&t| probe(&taken(curve, t))).collect();
             let response = Response::recover(&probes, &exposures, 255.0).unwrap();
             for (low, high) in [(0.05, 0.1), (0.1, 0.4), (0.2, 0.8)] {
                 let linear = |l: f64| f64::from(response.linear(1, (curve(l) * 255.0) as f32));
@@ -188,7 +192,7 @@ mod tests {
 
     #[test]
     fn two_exposures_are_too_few() {
-        let probes = [0.5, 1.0].map(|t| Probe::new(&taken(|l| l, t)));
+        let probes = [0.5, 1.0].map(|t| probe(&taken(|l| l, t)));
         let error = Response::recover(&probes, &[0.5, 1.0], 255.0).unwrap_err().to_string();
         assert!(error.contains("at least 3 exposures"), "{error}");
     }

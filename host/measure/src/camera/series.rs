@@ -3,7 +3,7 @@
 //! A photograph belongs to the lamp that its name begins with; its exposure time is that of the setup file, or that of EXIF. Photographs
 //! of no lamp or without a time are errors, as are lamps without photographs. What more exposures would show is advice.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::merge::{Exposure, Shot};
 use super::photo;
@@ -14,7 +14,20 @@ use crate::setup::Setup;
 pub(crate) fn series(folder: &Path, setup: &Setup) -> Result<Vec<Vec<Exposure>>, MeasureError> {
     let mut series: Vec<Vec<Exposure>> = vec![Vec::new(); setup.light.len()];
     let mut named: Vec<&String> = setup.exposures.keys().collect();
+    // Photographs that the setup file names are no exposures, wherever they lie.
+    let photos = &setup.photos;
+    let others: Vec<PathBuf> = [&photos.lamp_off, &photos.flat_field, &photos.dark_frame]
+        .into_iter()
+        .flatten()
+        .filter_map(|path| path.canonicalize().ok())
+        .collect();
+    named.retain(|name| {
+        photos.lamp_off.as_deref().and_then(Path::file_name).is_none_or(|off| off != name.as_str())
+    });
     for path in photo::list(folder)? {
+        if path.canonicalize().is_ok_and(|path| others.contains(&path)) {
+            continue;
+        }
         let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         let Some(light) = setup.light.iter().position(|light| name.starts_with(&light.photos)) else {
             let beginnings: Vec<&str> = setup.light.iter().map(|light| &*light.photos).collect();
@@ -24,19 +37,8 @@ pub(crate) fn series(folder: &Path, setup: &Setup) -> Result<Vec<Vec<Exposure>>,
             );
             return Err(MeasureError::photo(&path, problem));
         };
-        let exif = photo::exif(&path)?;
         named.retain(|other| **other != name);
-        let seconds =
-            setup.exposures.get(&name).copied().or(exif.seconds).filter(|t| t.is_finite() && *t > 0.0);
-        let Some(seconds) = seconds else {
-            return Err(MeasureError::photo(
-                &path,
-                format!(
-                    "has no exposure time; keep the camera's EXIF, or add `\"{name}\" = 0.004` (seconds) to [exposures] in the setup file"
-                ),
-            ));
-        };
-        series[light].push(Exposure { path, seconds, exif });
+        series[light].push(exposure(path, &name, setup)?);
     }
     if let Some(name) = named.first() {
         return Err(MeasureError::Scene(format!(
@@ -52,6 +54,28 @@ pub(crate) fn series(folder: &Path, setup: &Setup) -> Result<Vec<Vec<Exposure>>,
         ))),
         None => Ok(series),
     }
+}
+
+/// A photograph with its exposure time.
+fn exposure(path: PathBuf, name: &str, setup: &Setup) -> Result<Exposure, MeasureError> {
+    let exif = photo::exif(&path)?;
+    let seconds = setup.exposures.get(name).copied().or(exif.seconds).filter(|t| t.is_finite() && *t > 0.0);
+    let Some(seconds) = seconds else {
+        return Err(MeasureError::photo(
+            &path,
+            format!(
+                "has no exposure time; keep the camera's EXIF, or add `\"{name}\" = 0.004` (seconds) to [exposures] in the setup file"
+            ),
+        ));
+    };
+    Ok(Exposure { path, seconds, exif })
+}
+
+/// The photograph with the lamp off, if the setup file names one.
+pub(crate) fn lamp_off(setup: &Setup) -> Result<Option<Exposure>, MeasureError> {
+    let Some(path) = &setup.photos.lamp_off else { return Ok(None) };
+    let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    exposure(path.clone(), &name, setup).map(Some)
 }
 
 /// Relative exposures of a series.

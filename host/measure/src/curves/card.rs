@@ -43,6 +43,8 @@ pub struct Calibration {
     pub error: f64,
     /// By how much the brightest and the darkest step deviate, for each channel.
     pub deviation: [[f64; 3]; 2],
+    /// The reflectance of the darkest step.
+    pub darkest: f64,
 }
 
 impl Calibration {
@@ -314,7 +316,7 @@ pub fn calibrate(
             100.0 * worst.min(99.0)
         )));
     }
-    Ok(Calibration { steps, scale, error, deviation })
+    Ok(Calibration { steps, scale, error, deviation, darkest: reflectance[2] })
 }
 
 #[cfg(test)]

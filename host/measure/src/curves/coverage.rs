@@ -64,8 +64,9 @@ pub(crate) fn advice(stack: &str, rows: &[CurveRow]) -> Vec<String> {
             "stack {stack}: the peak is narrower than a pixel or the lamp: use a smaller lamp, and let the can fill the picture"
         ));
     }
-    let noisy =
-        seen.iter().filter(|row| (2.0..60.0).contains(&row.theta_deg) && row.sigma[1] > 0.1 * row.rgb[1]);
+    let noisy = seen.iter().filter(|row| {
+        (2.0..60.0).contains(&row.theta_deg) && (0..3).any(|c| row.sigma[c] > 0.1 * row.rgb[c])
+    });
     if noisy.count() * 5 > seen.len() {
         again.push(format!("stack {stack}: samples are uncertain by more than 10 %: add longer exposures"));
     }

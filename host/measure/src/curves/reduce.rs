@@ -16,20 +16,21 @@ use inks::ggx;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::patches::Region;
+pub use super::extent::angle;
+use super::extent::{Logs, place, predicted, share_below, value};
 use super::smooth::{falling_then_rising, smooth};
-use crate::camera::merge::Radiance;
 use crate::geometry::scene::{Scene, View};
 use crate::linalg::spread;
 
 /// Samples of a curve.
 pub const BINS: usize = 64;
 /// The most pixels of a bin that take part.
-const MOST: usize = 3000;
+pub(crate) const MOST: usize = 3000;
 /// The fewest.
 const FEWEST: usize = 8;
-/// Corrections of the curve.
+/// Corrections of the curve, and those that a lens' blur of more than half a pixel needs.
 const ROUNDS: usize = 5;
+const BLURRED_ROUNDS: usize = 12;
 /// Farther than this many robust deviations a pixel shows something else.
 const STRANGE: f64 = 3.5;
 /// Cosines below this are too near the horizon.
@@ -44,8 +45,6 @@ const FROM_BLURRED: f64 = 0.1;
 const GUESSED: f64 = 0.5;
 /// The largest relative standard deviation: nothing is known.
 const UNKNOWN: f64 = 2.0;
-/// Pixels along the sample's border that are left out.
-const BORDER: f64 = 2.5;
 /// Half angles above this (radians) are held constant.
 const GRAZING: f64 = 1.31;
 
@@ -113,88 +112,10 @@ pub struct Pixel {
 pub struct Reduced {
     /// Its samples, from 0 to 90 degrees.
     pub rows: Vec<CurveRow>,
+    /// ln f at the middles of the bins, before it is smoothed.
+    pub(crate) curve: Logs,
     /// Pixels that took part: x, y, series, and the deviation of ln f from the curve; those left out have none.
     pub used: Vec<(f64, f64, usize, Option<f64>)>,
-}
-
-/// The middle of a bin in radians.
-pub fn angle(bin: usize) -> f64 {
-    FRAC_PI_2 * ((bin as f64 + 0.5) / BINS as f64).powi(2)
-}
-
-fn place(theta: f64) -> f64 {
-    (theta / FRAC_PI_2).max(0.0).sqrt() * BINS as f64
-}
-
-/// A curve as ln f at the middles of the bins.
-type Logs = [[f64; BINS]; 3];
-
-/// f at an angle, for three channels: ln f is a cubic (Catmull and Rom) between samples, and even about 0 degrees.
-fn value(curve: &Logs, theta: f64) -> [f64; 3] {
-    let at = (place(theta) - 0.5).clamp(0.0, (BINS - 1) as f64);
-    let (i, t) = ((at as usize).min(BINS - 2), at - (at as usize).min(BINS - 2) as f64);
-    std::array::from_fn(|c| {
-        let y = &curve[c];
-        let (p, q) = (y[i], y[i + 1]);
-        let (before, after) = (if i > 0 { y[i - 1] } else { p }, if i + 2 < BINS { y[i + 2] } else { q });
-        let (m0, m1) = (0.5 * (q - before), 0.5 * (after - p));
-        let (t2, t3) = (t * t, t * t * t);
-        ((2.0 * t3 - 3.0 * t2 + 1.0) * p
-            + (t3 - 2.0 * t2 + t) * m0
-            + (3.0 * t2 - 2.0 * t3) * q
-            + (t3 - t2) * m1)
-            .exp()
-    })
-}
-
-/// What a curve predicts for a pixel: the mean over its area and the lamp.
-fn predicted(scene: &Scene, pixel: &Pixel, view: &View, curve: &Logs) -> [f64; 3] {
-    // Beyond 30 degrees nothing is narrow.
-    if view.theta > 0.52 {
-        return value(curve, view.theta).map(|f| f * view.irradiance);
-    }
-    let (mut sum, mut count) = ([0.0; 3], 0.0);
-    each_part(scene, pixel, |view| {
-        let f = value(curve, view.theta);
-        for c in 0..3 {
-            sum[c] += f[c] * view.irradiance;
-        }
-        count += 1.0;
-    });
-    if count > 0.0 { sum.map(|s| s / count) } else { value(curve, view.theta).map(|f| f * view.irradiance) }
-}
-
-/// The share of a pixel's light, as a curve predicts it, that comes from half angles below this.
-fn share_below(scene: &Scene, pixel: &Pixel, curve: &Logs, theta: f64) -> f64 {
-    let (mut below, mut all) = (0.0, 0.0);
-    each_part(scene, pixel, |view| {
-        let light = value(curve, view.theta)[1] * view.irradiance;
-        all += light;
-        below += if view.theta < theta { light } else { 0.0 };
-    });
-    if all > 0.0 { below / all } else { 0.0 }
-}
-
-/// What parts of a pixel see under parts of the lamp.
-fn each_part(scene: &Scene, pixel: &Pixel, mut each: impl FnMut(View)) {
-    let lamp = scene.diameter(pixel.light) / 2.0;
-    // Points of a disc with its mean and variance.
-    let lamps: &[[f64; 2]] = if lamp > 0.0 {
-        &[[0.0, 0.0], [0.707, 0.0], [-0.707, 0.0], [0.0, 0.707], [0.0, -0.707]]
-    } else {
-        &[[0.0, 0.0]]
-    };
-    for j in [-1.0, 0.0, 1.0] {
-        for i in [-1.0, 0.0, 1.0] {
-            for off in lamps {
-                let off = off.map(|d| d * lamp);
-                let place = [pixel.x + i / 3.0, pixel.y + j / 3.0];
-                if let Some(view) = scene.seen_under(place, pixel.light, pixel.first, off) {
-                    each(view);
-                }
-            }
-        }
-    }
 }
 
 /// Robust weighted mean of ratios: mean, standard deviation of one value, and which belong to it.
@@ -244,9 +165,21 @@ fn binned(scene: &Scene, pixels: &[Pixel]) -> Vec<Vec<(Pixel, View)>> {
     bins
 }
 
-/// Makes a curve. `doubts` are scenes one standard deviation away with the factor that each puts on the card's scale, and `card` is
-/// the relative standard deviation of the scale.
-pub fn reduce(scene: &Scene, pixels: &[Pixel], doubts: &[(Scene, Vec<f64>)], card: f64) -> Reduced {
+/// What is uncertain besides the pixels.
+#[derive(Clone, Default)]
+pub struct Doubts {
+    /// Scenes one standard deviation away, with the factor that each puts on the card's scale.
+    pub scenes: Vec<(Scene, Vec<f64>)>,
+    /// Relative standard deviation of the scale.
+    pub card: f64,
+    /// Reflectance that light on the card, but not the lamp's, pretends.
+    pub card_foreign: [f64; 3],
+    /// Radiance that may not be the lamp's, in the units of the pixels.
+    pub foreign: [f64; 3],
+}
+
+/// Makes a curve.
+pub fn reduce(scene: &Scene, pixels: &[Pixel], doubts: &Doubts) -> Reduced {
     let bins = binned(scene, pixels);
     let mut curve: Logs = [[f64::NAN; BINS]; 3];
     for (b, bin) in bins.iter().enumerate().filter(|(_, bin)| bin.len() >= FEWEST) {
@@ -258,13 +191,14 @@ pub fn reduce(scene: &Scene, pixels: &[Pixel], doubts: &[(Scene, Vec<f64>)], car
     fill(&mut curve);
     let mut found = [Bin::default(); BINS];
     let mut used = Vec::new();
-    for round in 0..ROUNDS {
+    let rounds = if scene.blur() > 0.5 { BLURRED_ROUNDS } else { ROUNDS };
+    for round in 0..rounds {
         let results: Vec<(Bin, [f64; 3], Vec<Option<f64>>)> =
             bins.par_iter().map(|bin| correct(scene, bin, &curve)).collect();
         used.clear();
         for (b, (bin, ratio, deviations)) in results.into_iter().enumerate() {
             found[b] = bin;
-            if bin.pixels >= FEWEST && round + 1 < ROUNDS {
+            if bin.pixels >= FEWEST && round + 1 < rounds {
                 for c in 0..3 {
                     curve[c][b] += ratio[c].clamp(0.2, 5.0).ln();
                 }
@@ -276,8 +210,18 @@ pub fn reduce(scene: &Scene, pixels: &[Pixel], doubts: &[(Scene, Vec<f64>)], car
         fill(&mut curve);
     }
     spread_blur(scene, &bins, &curve, &mut found);
-    let geometry = shifts(scene, pixels, &curve, doubts);
-    Reduced { rows: rows(&curve, &found, &geometry, card), used }
+    let mut others = shifts(scene, pixels, &curve, &doubts.scenes);
+    for ((b, others), bin) in others.iter_mut().enumerate().zip(&bins) {
+        let mut light: Vec<f64> = bin.iter().map(|(_, view)| view.irradiance).collect();
+        let light = crate::linalg::median(&mut light).max(1e-30);
+        for c in 0..3 {
+            let f = curve[c][b].exp().max(1e-9);
+            others[c] += doubts.card.powi(2)
+                + (doubts.card_foreign[c] / f).powi(2)
+                + (doubts.foreign[c] / light / f).powi(2);
+        }
+    }
+    Reduced { rows: rows(&curve, &found, &others), curve, used }
 }
 
 /// Marks samples beside a blurred peak, too, as long as their pixels see so much of it that its height decides what they are.
@@ -415,7 +359,7 @@ fn shifts(scene: &Scene, pixels: &[Pixel], curve: &Logs, doubts: &[(Scene, Vec<f
 }
 
 /// The samples of the curve: smoothed, extended, with their deviations.
-fn rows(curve: &Logs, found: &[Bin; BINS], geometry: &[[f64; 3]], card: f64) -> Vec<CurveRow> {
+fn rows(curve: &Logs, found: &[Bin; BINS], others: &[[f64; 3]]) -> Vec<CurveRow> {
     let measured = |b: usize| found[b].pixels >= FEWEST && angle(b) <= GRAZING;
     let first = (0..BINS).find(|&b| measured(b));
     let last = (0..BINS).rev().find(|&b| measured(b));
@@ -457,15 +401,13 @@ fn rows(curve: &Logs, found: &[Bin; BINS], geometry: &[[f64; 3]], card: f64) -> 
             } else {
                 deviation[b].powi(2)
             };
-            let mut variance = noise + geometry[b][c] + card * card;
+            let mut variance = noise + others[b][c];
             let mut ln = z[b];
             if b < start {
                 ln = peak(angle(b)).max(z[start]);
                 // Below what was seen a peak may be as much higher again as the lobe makes it.
-                variance = geometry[start][c]
-                    + card * card
-                    + deviation[start].powi(2)
-                    + (0.1 + 0.5 * (ln - z[start])).powi(2);
+                variance =
+                    others[start][c] + deviation[start].powi(2) + (0.1 + 0.5 * (ln - z[start])).powi(2);
                 if found[start].blurred {
                     // Nothing says how high a peak is of which no pixel sees a part alone.
                     variance = UNKNOWN * UNKNOWN;
@@ -521,69 +463,6 @@ fn lobe(z: &[f64], start: usize, last: usize) -> impl Fn(f64) -> f64 {
     }
     let (_, alpha, x) = best;
     move |theta| (x[0] * ggx::lobe(theta, alpha) + x[1]).max(1e-9).ln()
-}
-
-/// Pixels of a region, without the sample's border and what is near the horizon, thinned to what a curve needs.
-pub fn pixels(
-    radiance: &Radiance,
-    scene: &Scene,
-    scale: [f64; 3],
-    light: usize,
-    region: &Region,
-) -> Vec<Pixel> {
-    let [left, top, right, bottom] = match region {
-        Region::All => [0.0, 0.0, radiance.width as f64, radiance.height as f64],
-        Region::Pixels(rectangle) => *rectangle,
-        Region::Sheet(part) => part.around,
-    };
-    let inside = |x: f64, y: f64| match region {
-        Region::Sheet(part) => scene.unrolled(x, y).is_some_and(|place| part.holds(place)),
-        _ => true,
-    };
-    let whole =
-        |from: f64, to: f64, most: usize| (from.ceil().max(0.0) as usize)..(to.floor() as usize).min(most);
-    let columns = whole(left, right, radiance.width);
-    let lit = |x: f64, y: f64| scene.view(x, y, light).filter(|v| v.cos_i >= HORIZON && v.cos_o >= HORIZON);
-    let row = |y: usize| -> Vec<(u32, u8)> {
-        let mut found = Vec::new();
-        for x in columns.clone() {
-            let (px, py) = (x as f64 + 0.5, y as f64 + 0.5);
-            let i = y * radiance.width + x;
-            let Some(view) = lit(px, py).filter(|_| !radiance.value[3 * i].is_nan()) else { continue };
-            let near = [(-BORDER, 0.0), (BORDER, 0.0), (0.0, -BORDER), (0.0, BORDER)];
-            if near.iter().all(|(i, j)| lit(px + i, py + j).is_some()) && inside(px, py) {
-                found.push((i as u32, (place(view.theta) as usize).min(BINS - 1) as u8));
-            }
-        }
-        found
-    };
-    let rows: Vec<usize> = whole(top, bottom, radiance.height).collect();
-    let all: Vec<(u32, u8)> = rows.into_par_iter().map(row).collect::<Vec<_>>().concat();
-    let mut counts = [0usize; BINS];
-    all.iter().for_each(|(_, bin)| counts[usize::from(*bin)] += 1);
-    let mut passed = [0usize; BINS];
-    let kept = all.into_iter().filter(|(_, bin)| {
-        let bin = usize::from(*bin);
-        passed[bin] += 1;
-        // Twice as many as take part: corrections of the geometry move pixels between bins.
-        passed[bin] % counts[bin].div_ceil(2 * MOST).max(1) == 0
-    });
-    kept.map(|(i, _)| {
-        let i = i as usize;
-        let value = |c: usize| f64::from(radiance.value[3 * i + c]);
-        Pixel {
-            x: (i % radiance.width) as f64 + 0.5,
-            y: (i / radiance.width) as f64 + 0.5,
-            light,
-            value: std::array::from_fn(|c| scale[c] * value(c)),
-            variance: std::array::from_fn(|c| {
-                f64::from(radiance.variance[3 * i + c]) / value(c).powi(2).max(1e-30)
-            }),
-            bound: radiance.bound[i],
-            first: radiance.first[i],
-        }
-    })
-    .collect()
 }
 
 #[cfg(test)]

@@ -115,6 +115,8 @@ pub struct Scene {
     diameters: Vec<f64>,
     card: (Vector, Vector),
     slips: ResidualShifts,
+    /// Standard deviation of the lens' blur in pixels.
+    blur: f64,
 }
 
 impl Scene {
@@ -181,6 +183,7 @@ impl Scene {
             diameters: setup.light.iter().map(|light| light.diameter_mm).collect(),
             card: (setup.card.position_mm.unwrap_or(sample.centre_mm), unit(facing)),
             slips: ResidualShifts::default(),
+            blur: 0.0,
         })
     }
 
@@ -203,6 +206,23 @@ impl Scene {
     #[must_use]
     pub(crate) fn with_slips(self, slips: ResidualShifts) -> Scene {
         Scene { slips, ..self }
+    }
+
+    /// The same scene through a lens that blurs by so many pixels.
+    #[must_use]
+    pub(crate) fn with_blur(self, blur: f64) -> Scene {
+        Scene { blur, ..self }
+    }
+
+    /// Standard deviation of the lens' blur in pixels.
+    pub(crate) fn blur(&self) -> f64 {
+        self.blur
+    }
+
+    /// How far a lamp is from the sample's middle in mm.
+    pub(crate) fn lamp_distance(&self, light: usize) -> f64 {
+        let way = along(self.lights[light], -1.0, self.centre);
+        dot(way, way).sqrt()
     }
 
     /// The scene with one measure changed.

@@ -1,9 +1,11 @@
 //! Photographs, scans and other readings to curves, as the program uses them.
 
 mod can;
+mod disturbed;
 mod flat;
 mod made;
 mod narrow;
 mod rendered;
 mod renderer;
 mod scans;
+mod studio;

@@ -3,7 +3,7 @@
 //! Pixels are made here: each is the mean of rays through its area, under a lamp without extent.
 
 use inks::ggx;
-use measure::curves::reduce::{CurveRow, Pixel, SampleOrigin, reduce};
+use measure::curves::reduce::{CurveRow, Doubts, Pixel, SampleOrigin, reduce};
 use measure::geometry::scene::Scene;
 use measure::setup::Setup;
 use rayon::prelude::*;
@@ -57,7 +57,7 @@ fn measured(alpha: f64) -> Vec<CurveRow> {
             })
         })
         .collect();
-    reduce(&scene, &pixels, &[], 0.005).rows
+    reduce(&scene, &pixels, &Doubts { card: 0.005, ..Doubts::default() }).rows
 }
 
 #[test]
