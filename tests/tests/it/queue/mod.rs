@@ -575,7 +575,7 @@ fn the_print_system_finds_the_backend_and_takes_the_printer_description() {
     let server = server!();
     let found = server.say("lpinfo", &["-v"]);
     assert!(found.lines().any(|line| line.contains("foilpress")), "{found}");
-    let description = server.path("files").join(foilpress::queue::install::DESCRIPTION);
+    let description = server.path("files").join(queue::install::DESCRIPTION);
     // The print system's own judge; the filters it looks for are not in the system's folders.
     let judged =
         server.command("cupstestppd", &["-I", "filters", "-W", "none", description.to_str().unwrap()]);

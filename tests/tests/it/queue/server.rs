@@ -1,7 +1,7 @@
 //! A print server of its own: configuration, spool and programs in a temporary folder, on loopback, no system service.
 
-use foilpress::queue::install::{DESCRIPTION, Places, put};
-use foilpress::queue::ppd;
+use queue::install::{DESCRIPTION, Places, put};
+use queue::ppd;
 use press::layout::Profile;
 use std::fs;
 use std::net::{TcpListener, TcpStream};

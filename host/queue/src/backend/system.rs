@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use protocol::status;
 
-use crate::queue::messages::{Messages, Reason};
+use crate::messages::{Messages, Reason};
 use device::deliver::{Caller, Cartridges, Failure, News, Question};
 use device::forms::PassPlace;
 use device::questions::cartridges::Found;

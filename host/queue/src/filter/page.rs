@@ -7,8 +7,8 @@ use protocol::ink::{Ink, Kind};
 use protocol::paper::{LEFT, Paper};
 
 use super::{FilterError, io_error};
-use crate::queue::options::{Choices, Place, Spots};
-use crate::queue::ppd;
+use crate::options::{Choices, Place, Spots};
+use crate::ppd;
 use art::{Artwork, Window};
 use observe::Observer;
 use press::job::Handling;
