@@ -15,7 +15,7 @@ use serde_json::json;
 use crate::cli::console::{chain, show, stderr, stdout};
 use queue::call::{Call, Exit};
 use queue::install::{self, Places};
-use queue::messages::Messages;
+use queue::messages::{Messages, Report as _};
 use queue::options::{self, Choices};
 use queue::{backend, filter, listing, ppd, uri};
 use device::printers::{self, Printers};
