@@ -273,7 +273,7 @@ impl Choices {
             profile: description.map_or_else(Profile::default, profile_in),
             pages: Vec::new(),
             paper: Paper::A4,
-            more: art::Settings::default(),
+            more: art::Settings { inks: InkSet::of(Ink::ALL), ..art::Settings::default() },
         })
     }
 }

@@ -148,7 +148,11 @@ impl<R: Read> Reader<R> {
                     (6, 32) => Colours::Cmyk,
                     _ => {
                         let found = format!("{space} with {pixel} bits a pixel");
-                        return Err(wrong("colour space", found, "0 (grey), 1 (sRGB) or 6 (CMYK) with 8 bits"));
+                        return Err(wrong(
+                            "colour space",
+                            found,
+                            "0 (grey), 1 (sRGB) or 6 (CMYK) with 8 bits",
+                        ));
                     }
                 };
                 (pixel, colours, 1)

@@ -73,8 +73,8 @@ impl Press<'_> {
         let choices = self.choices;
         let spots = Ink::ALL.into_iter().filter(|ink| match ink.kind() {
             Kind::Process => choices.colours.contains(*ink),
-            Kind::Foil => choices.foils,
-            _ => true,
+            Kind::Foil => choices.foils && choices.more.inks.contains(*ink),
+            _ => choices.more.inks.contains(*ink),
         });
         art::Settings {
             inks: InkSet::of(spots),
