@@ -3,7 +3,7 @@
 //! Method: header and rows are read as they come; a row is unpacked into red, green and blue. Grey and black-and-white
 //! pages become colours of equal parts, and cyan, magenta, yellow and black those that PDF says ink leaves: (1 - c)(1 - k). The two
 //! formats pack rows alike and differ in their headers.
-//! Cost: one row of memory. Limits: sRGB, sGrey, CMYK and black, 8 bits (black also 1), the [`RESOLUTIONS`], whole sheets.
+//! Cost: one row of memory. Limits: sRGB, sGrey, CMYK and black, 8 bits (sRGB also 16, black also 1), the [`RESOLUTIONS`], whole sheets.
 //! Source: PWG 5102.4; ISO 32000-1, 10.3.5; for Apple raster, which has no public text, the readers of CUPS and of `print_raster`.
 
 use std::io::{self, Read};
@@ -48,6 +48,8 @@ pub enum RasterError {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Colours {
     Rgb,
+    /// 16 bits, the high byte first. Eight are more than dots show.
+    Rgb16,
     Grey,
     /// More is darker.
     Cmyk,
@@ -161,6 +163,7 @@ impl<R: Read> Reader<R> {
                 let (bits, pixel, space, order) = (number(384), number(388), number(400), number(396));
                 let colours = match (space, bits, pixel) {
                     (19 | 1, 8, 24) => Colours::Rgb,
+                    (19 | 1, 16, 48) => Colours::Rgb16,
                     (18 | 0, 8, 8) => Colours::Grey,
                     (6, 8, 32) => Colours::Cmyk,
                     (3, 8, 8) => Colours::Black,
@@ -169,7 +172,7 @@ impl<R: Read> Reader<R> {
                         return Err(wrong(
                             "cupsColorSpace",
                             format!("{space} with {bits} bits a colour"),
-                            "19 (sRGB), 18 (sGrey) or 6 (CMYK) with 8 bits, or 3 (black)",
+                            "19 (sRGB) with 8 or 16 bits, 18 (sGrey) or 6 (CMYK) with 8, or 3 (black)",
                         ));
                     }
                 };
@@ -201,6 +204,7 @@ impl<R: Read> Reader<R> {
         rgb.clear();
         match page.colours {
             Colours::Rgb => rgb.extend_from_slice(&self.line),
+            Colours::Rgb16 => rgb.extend(self.line.iter().step_by(2)),
             Colours::Grey => rgb.extend(self.line.iter().flat_map(|&v| [v; 3])),
             Colours::Cmyk => rgb.extend(self.line.as_chunks::<4>().0.iter().flat_map(|&[c, m, y, k]| {
                 [c, m, y].map(|ink| {
@@ -227,6 +231,7 @@ impl<R: Read> Reader<R> {
     fn unpack(&mut self, page: &Page) -> Result<(), RasterError> {
         let (pixel, paper) = match page.colours {
             Colours::Rgb => (3, 255),
+            Colours::Rgb16 => (6, 255),
             Colours::Grey => (1, 255),
             Colours::Cmyk => (4, 0),
             Colours::Black | Colours::Bits => (1, 0),
@@ -324,6 +329,10 @@ mod tests {
         stream.extend([0, 254, 255, 0, 0, 0, 0, 0, 0, 255, 0, 0, 128, 128, 128]);
         let [row] = &rows(&stream).unwrap()[0][..] else { panic!("one row") };
         assert_eq!(row, &[0, 255, 255, 0, 0, 0, 127, 127, 63, 255, 255, 255]);
+        // Of sixteen bits the first eight count.
+        let mut stream = header(2, 1, 19, 16, 48);
+        stream.extend([0, 0, 1, 99, 2, 99, 3, 99, 128]);
+        assert_eq!(rows(&stream).unwrap()[0][0], [1, 2, 3, 255, 255, 255]);
     }
 
     #[test]

@@ -174,7 +174,7 @@ pub fn plain(status: StatusCode, kind: &'static str, body: impl Into<Bytes>) -> 
     headers.insert(
         CONTENT_SECURITY_POLICY,
         hyper::header::HeaderValue::from_static(
-            "default-src 'none'; img-src 'self' data: blob:; style-src 'unsafe-inline'; script-src 'self'; connect-src 'self'; \
+            "default-src 'none'; img-src 'self' data: blob:; style-src 'self'; script-src 'self'; connect-src 'self'; \
              frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
         ),
     );
@@ -209,12 +209,14 @@ async fn respond(
             let place = Place { host, is_encrypted: false, printer };
             ipp(server, request.into_body(), &place, limits).await
         }
-        (&Method::GET | &Method::HEAD, path) => block_in_place(|| desk::get(server, path)),
+        (&Method::GET | &Method::HEAD, path) => {
+            let query = request.uri().query().unwrap_or_default();
+            block_in_place(|| desk::get(server, path, query))
+        }
         (&Method::POST, path) => {
             let query = request.uri().query().unwrap_or_default().to_owned();
-            let (path, is_own) = (path.to_owned(), origin.is_some());
-            // A form on a foreign page says where it comes from; what says nothing is no page.
-            let guest = desk::Guest { may_change, is_own };
+            let path = path.to_owned();
+            let guest = desk::Guest { may_change };
             desk::post(server, &path, &query, &guest, request.into_body(), limits).await
         }
         _ => words(StatusCode::METHOD_NOT_ALLOWED, "there is no such thing to do"),

@@ -13,6 +13,7 @@
 pub mod access;
 pub mod desk;
 pub mod http;
+pub mod install;
 pub mod jobs;
 pub mod operations;
 pub mod printer;

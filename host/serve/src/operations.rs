@@ -6,6 +6,8 @@
 //! not a proof.
 //! Source: RFC 8011, section 4; PWG 5100.7, 5100.11 and 5100.14.
 
+use std::path::{Path, PathBuf};
+
 use ipp::model::{DelimiterTag, Operation, StatusCode};
 use ipp::value::IppValue;
 
@@ -253,7 +255,7 @@ pub fn arrived(
     place: &Place,
     request: &Request,
     incoming: &Incoming,
-    spooled: Result<(std::path::PathBuf, Kind, u64), SpoolError>,
+    spooled: Result<(PathBuf, Kind, u64), SpoolError>,
 ) -> Response {
     let id = incoming.job;
     let kept = match spooled {
@@ -272,14 +274,7 @@ pub fn arrived(
             };
             return status(request, code, &observe::with_causes(&error));
         }
-        Ok((path, kind, octets)) => server.change(id, |job| {
-            if job.document.is_some() {
-                return Err(ChangeError::State("one with a document already"));
-            }
-            job.document = path.file_name().map(|name| name.to_string_lossy().into_owned());
-            (job.format, job.octets) = (kind.mime.into(), octets);
-            Ok(())
-        }),
+        Ok((path, kind, octets)) => keep_document(server, id, &path, kind, octets),
     };
     let kept = match incoming.is_last {
         true => kept.and_then(|()| server.arrived(id)),
@@ -289,6 +284,27 @@ pub fn arrived(
         Ok(()) => job_answer(server, place, request, id, &incoming.unsupported),
         Err(error) => failed(request, &error),
     }
+}
+
+/// A job has this document.
+///
+/// # Errors
+/// It has one already, or it cannot be kept.
+pub fn keep_document(
+    server: &Server,
+    id: u32,
+    path: &Path,
+    kind: Kind,
+    octets: u64,
+) -> Result<(), ChangeError> {
+    server.change(id, |job| {
+        if job.document.is_some() {
+            return Err(ChangeError::State("one with a document already"));
+        }
+        job.document = path.file_name().map(|name| name.to_string_lossy().into_owned());
+        (job.format, job.octets) = (kind.mime.into(), octets);
+        Ok(())
+    })
 }
 
 /// The answer to whoever has made a job.

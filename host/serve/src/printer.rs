@@ -236,7 +236,11 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
         (D, "printer-uuid", uri(&format!("urn:uuid:{uuid}"))),
         (D, "pwg-raster-document-resolution-supported", list(queue::raster::RESOLUTIONS.map(dpi))),
         (D, "pwg-raster-document-sheet-back", keyword("normal")),
-        (D, "pwg-raster-document-type-supported", keywords(["black_1", "cmyk_8", "sgray_8", "srgb_8"])),
+        (
+            D,
+            "pwg-raster-document-type-supported",
+            keywords(["black_1", "cmyk_8", "sgray_8", "srgb_8", "srgb_16"]),
+        ),
         (D, "queued-job-count", integer(queued)),
         (D, "urf-supported", keywords(URF)),
         (D, "uri-authentication-supported", keyword("none")),

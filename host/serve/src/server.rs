@@ -173,6 +173,8 @@ pub struct Server {
     pub store: Store,
     data: Mutex<Data>,
     wake: Condvar,
+    /// Held while a document is drawn: a page is 100 MB.
+    pub drawing: Mutex<()>,
     /// When it began.
     pub started: Instant,
     /// Told what people at the terminal should know.
@@ -207,19 +209,7 @@ impl Server {
                 store.clear(job.id, false)?;
             }
         }
-        let path = settings.folder.join("server.json");
-        let kept = std::fs::read(&path).ok().and_then(|text| serde_json::from_slice::<Kept>(&text).ok());
-        let kept = match kept.filter(|kept| paper(kept.loaded.size).is_some()) {
-            Some(kept) => kept,
-            None => {
-                let mut seed = [0; 16];
-                crate::random(&mut seed).map_err(file(&path))?;
-                let loaded = Loaded { size: size(Paper::A4), kind: crate::template::AUTO.into() };
-                let kept = Kept { seed: hex(&seed), loaded };
-                keep(&path, &kept).map_err(file(&path))?;
-                kept
-            }
-        };
+        let kept = kept(&settings.folder).map_err(file(&settings.folder))?;
         let data = Data {
             next: jobs.keys().next_back().map_or(1, |last| last + 1),
             jobs,
@@ -237,6 +227,7 @@ impl Server {
             store,
             data: Mutex::new(data),
             wake: Condvar::new(),
+            drawing: Mutex::new(()),
             started: Instant::now(),
             observer,
             _lock: lock,
@@ -469,6 +460,31 @@ impl Server {
 /// The identity of a printer or a job, see [`Server::uuid`].
 pub fn identity(data: &Data, of: &str) -> String {
     uuid(&data.kept.seed, of)
+}
+
+/// The identities that printers of these names have where jobs are kept in this folder.
+///
+/// # Errors
+/// What the system says.
+pub fn identities(folder: &Path, printers: &[String]) -> std::io::Result<Vec<String>> {
+    durable::make_folder(folder, Access::Private)?;
+    let kept = kept(folder)?;
+    Ok(printers.iter().map(|name| uuid(&kept.seed, &format!("printer {name}"))).collect())
+}
+
+/// What is kept beside the jobs in a folder; made if it is not there or cannot be read.
+fn kept(folder: &Path) -> std::io::Result<Kept> {
+    let path = folder.join("server.json");
+    let kept = std::fs::read(&path).ok().and_then(|text| serde_json::from_slice::<Kept>(&text).ok());
+    if let Some(kept) = kept.filter(|kept| paper(kept.loaded.size).is_some()) {
+        return Ok(kept);
+    }
+    let mut seed = [0; 16];
+    crate::random(&mut seed)?;
+    let loaded = Loaded { size: size(Paper::A4), kind: crate::template::AUTO.into() };
+    let kept = Kept { seed: hex(&seed), loaded };
+    keep(&path, &kept)?;
+    Ok(kept)
 }
 
 fn keep(path: &Path, kept: &Kept) -> std::io::Result<()> {

@@ -321,7 +321,7 @@ mod tests {
                 "{keyword}"
             );
         }
-        assert_eq!(margins(Paper::A4), [339, 1202, 341, 1524]);
+        assert_eq!(margins(Paper::A4), [339, 1202, 341, 1523]);
         assert!(margins(Paper::Postcard)[1] < 310);
         let index = size_of("na_index-4x6_4x6in").unwrap();
         assert_eq!(index, (10160, 15240));

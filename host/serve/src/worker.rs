@@ -12,7 +12,7 @@ use std::borrow::Cow;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 use files::durable::{self, Access};
 use observe::{Observer, with_causes};
@@ -61,10 +61,7 @@ fn print(server: &Server, job: &Job) -> Result<(), ChangeError> {
         listed: (String::new(), String::new()),
         lister: PathBuf::new(),
     };
-    let drawn = match job.sheets {
-        Some(_) => Ok(()),
-        None => draw(server, job, &voice),
-    };
+    let drawn = prepare_for(server, job.id, &voice);
     if voice.is_cancelled() {
         return end(server, &call, &voice, State::Canceled, "cancelled");
     }
@@ -72,11 +69,6 @@ fn print(server: &Server, job: &Job) -> Result<(), ChangeError> {
         return end(server, &call, &voice, State::Aborted, &why);
     }
     let folder = Folder::of(&server.store.sheets(job.id));
-    server.change(job.id, |job| {
-        job.sheets =
-            Some(u32::try_from(folder.files.len()).unwrap_or(u32::MAX).saturating_mul(job.ticket.copies));
-        Ok(())
-    })?;
     let stop = || voice.is_cancelled();
     let (exit, whole) = backend::deliver(&call, &server.settings.devices, &folder, &voice, &stop, &stop);
     match exit {
@@ -105,6 +97,33 @@ fn end(server: &Server, call: &Call, voice: &Voice<'_>, state: State, why: &str)
     voice.reasons(&[]);
     backend::forget(call, voice);
     Ok(server.store.clear(voice.id, false)?)
+}
+
+/// Makes the sheets of a job that waits, so that somebody can look at them.
+///
+/// # Errors
+/// In words: why there are none.
+pub fn prepare(server: &Server, id: u32) -> Result<(), String> {
+    prepare_for(server, id, &Voice { server, id, stage: Mutex::default() })
+}
+
+/// Makes the sheets of a job unless they are there, and puts on record that all of them are.
+fn prepare_for(server: &Server, id: u32, voice: &Voice<'_>) -> Result<(), String> {
+    let _drawing = server.drawing.lock().unwrap_or_else(PoisonError::into_inner);
+    let job = server.data().jobs.get(&id).cloned().ok_or("there is no such job")?;
+    if job.sheets.is_some() {
+        return Ok(());
+    }
+    if job.state.is_over() || job.state == State::Incoming {
+        return Err("the job has no document that could be drawn".into());
+    }
+    draw(server, &job, voice)?;
+    let count = Folder::of(&server.store.sheets(id)).files.len();
+    let kept = server.change(id, |job| {
+        job.sheets = Some(u32::try_from(count).unwrap_or(u32::MAX).saturating_mul(job.ticket.copies));
+        Ok(())
+    });
+    kept.map_err(|error| with_causes(&error))
 }
 
 /// Makes the sheets of a job.
@@ -162,12 +181,13 @@ impl Write for SheetFiles<'_> {
 }
 
 /// The sheets in a folder, in order.
-struct Folder {
+pub struct Folder {
     files: Vec<PathBuf>,
 }
 
 impl Folder {
-    fn of(folder: &Path) -> Folder {
+    /// Those there are.
+    pub fn of(folder: &Path) -> Folder {
         let mut files: Vec<PathBuf> = fs::read_dir(folder)
             .into_iter()
             .flatten()
@@ -219,11 +239,11 @@ impl Voice<'_> {
 
 impl Observer for Voice<'_> {
     fn begin(&self, _stage: &str, total: u64) {
-        *self.stage.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = (total, 0);
+        *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = (total, 0);
     }
 
     fn advance(&self, steps: u64) {
-        let mut stage = self.stage.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut stage = self.stage.lock().unwrap_or_else(PoisonError::into_inner);
         stage.1 += steps;
     }
 

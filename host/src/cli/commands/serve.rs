@@ -16,13 +16,14 @@ use device::connection::Destination;
 #[command(after_help = "Examples:\n  \
     foilpress serve --to usb:                              (for this computer: http://localhost:8631/)\n  \
     foilpress serve --to usb: --share                      (for every device of the house)\n  \
-    foilpress serve --to file:sheets                       (keeps each sheet as a file in the folder sheets)\n\n\
+    foilpress serve --to file:sheets                       (keeps each sheet as a file in the folder sheets)\n  \
+    sudo foilpress serve --to usb: --install               (from now on, at every start of this computer)\n\n\
     Each preset that fits `foilpress layers` is a printer of its own, at ipp://HOST:8631/ipp/print/PRESET. The printer `standard` \
     is always there. Stop the server with Ctrl-C: jobs are kept, and continue when it starts again.")]
 pub struct Args {
     /// Destination: usb:, serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE, or file:FOLDER
-    #[arg(long, value_name = "WHERE")]
-    pub to: Destination,
+    #[arg(long, value_name = "WHERE", value_parser = destination, required_unless_present = "uninstall")]
+    pub to: Option<(String, Destination)>,
     /// Address and port to listen on
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8631")]
     pub listen: SocketAddr,
@@ -32,12 +33,24 @@ pub struct Args {
     /// need the code that is shown in the terminal.
     #[arg(long)]
     pub share: bool,
+    /// Install the server as a service of the system that is found by print dialogs, with your presets (as root)
+    ///
+    /// Writes a systemd unit, and a service file of Avahi for each printer. Install again after a change of presets.
+    #[arg(long, conflicts_with_all = ["jobs", "library", "share"])]
+    pub install: bool,
+    /// Remove the service with everything it has kept (as root)
+    #[arg(long, conflicts_with_all = ["install", "to", "listen", "share", "jobs", "library"])]
+    pub uninstall: bool,
     /// Folder of the jobs [default: serve/ beside the jobs of `send`]
     #[arg(long, value_name = "DIR")]
     pub jobs: Option<PathBuf>,
     /// Your own ink library: its folder, or the name it was added under [default: the built-in library]
     #[arg(long, value_name = "LIBRARY")]
     pub library: Option<PathBuf>,
+}
+
+fn destination(text: &str) -> Result<(String, Destination), device::connection::NoDestination> {
+    Ok((text.to_owned(), text.parse()?))
 }
 
 /// Runs `serve`.
@@ -59,7 +72,8 @@ mod with_server {
     use anyhow::{Context as _, bail};
     use clap::FromArgMatches as _;
     use serve::http::{self, Limits};
-    use serve::server::{Preset, Server, Settings};
+    use serve::install::{Places, Service, UNIT};
+    use serve::server::{Preset, Server, Settings, identities};
     use serve::worker;
 
     use super::*;
@@ -90,6 +104,14 @@ mod with_server {
 
     /// Runs `serve` until the process is ended.
     pub fn run(args: &Args, program: &clap::Command) -> Result<()> {
+        let (typed, to) = match &args.to {
+            _ if args.uninstall => return uninstall(),
+            Some(to) => to.clone(),
+            None => bail!("--to says where sheets go, such as --to usb:"),
+        };
+        if args.install {
+            return install(&typed, args.listen.port(), program);
+        }
         let folder = match &args.jobs {
             Some(folder) => folder.clone(),
             None => Journal::of_user()?.folder().join("serve"),
@@ -103,7 +125,7 @@ mod with_server {
         })?;
         let address = listener.local_addr()?;
         let settings = Settings {
-            to: args.to.clone(),
+            to,
             printers: printers(program)?,
             folder,
             library: crate::libraries::given(args.library.as_deref())?,
@@ -132,6 +154,44 @@ mod with_server {
         std::thread::Builder::new().name("printing".into()).spawn(move || worker::work(&printing))?;
         show(&text)?;
         Ok(http::run(&server, vec![listener], Limits::default())?)
+    }
+
+    /// Tells the system about the service.
+    fn systemctl(arguments: &[&str]) -> Result<()> {
+        let done = std::process::Command::new("systemctl").args(arguments).status();
+        match done.context("cannot start systemctl; the files are there, but this system has no systemd")? {
+            status if status.success() => Ok(()),
+            status => bail!("systemctl {}: {status}", arguments.join(" ")),
+        }
+    }
+
+    const AS_ROOT: &str = "only root may change services; run the same command with sudo";
+
+    fn install(to: &str, port: u16, program: &clap::Command) -> Result<()> {
+        let places = Places::at(std::path::Path::new("/"));
+        let printers = printers(program)?;
+        let names: Vec<String> = printers.iter().map(|printer| printer.name.clone()).collect();
+        let uuids = identities(&places.state(), &names).context(AS_ROOT)?;
+        let printers: Vec<(Preset, String)> = printers.into_iter().zip(uuids).collect();
+        let own = std::env::current_exe().context("cannot find this program's own file")?;
+        let presets = crate::folders::config()?.join("presets");
+        let service = Service { program: &own, to, port, printers: &printers, presets: &presets };
+        let written = places.install(&service).context(AS_ROOT)?;
+        let list: String = written.iter().map(|path| format!("{}\n", path.display())).collect();
+        show(&list)?;
+        systemctl(&["daemon-reload"])?;
+        systemctl(&["enable", "--now", UNIT])
+    }
+
+    fn uninstall() -> Result<()> {
+        // A service that is not there need not be stopped.
+        let stopped = systemctl(&["disable", "--now", UNIT]);
+        Places::at(std::path::Path::new("/")).uninstall().context(AS_ROOT)?;
+        show("the service is removed, with its jobs\n")?;
+        match stopped {
+            Ok(()) => systemctl(&["daemon-reload"]),
+            Err(_) => Ok(()),
+        }
     }
 
     /// The printer without options, and one for each preset that fits.
