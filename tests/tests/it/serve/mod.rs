@@ -89,7 +89,8 @@ fn three_ways_to_print_a_document_make_the_same_job() {
         let layers = fs::read(bench.path(&format!("{name}.print/job.rgl"))).unwrap();
 
         let dialog = "FoilpressWhite=Under FoilpressCurl=Off";
-        let filter = bench.command_of(["cups-filter", "1", "me", "title", "1", dialog, name]).output().unwrap();
+        let filter =
+            bench.command_of(["cups-filter", "1", "me", "title", "1", dialog, name]).output().unwrap();
         assert!(filter.status.success(), "{}", String::from_utf8_lossy(&filter.stderr));
 
         let serving = Serving::start(&bench, &format!("file:{name}.sheets"));
