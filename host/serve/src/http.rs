@@ -11,25 +11,32 @@ use std::collections::HashMap;
 use std::convert::Infallible;
 use std::io;
 use std::net::{IpAddr, SocketAddr};
+use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use http_body_util::{BodyExt as _, Full};
 use hyper::body::Incoming;
-use hyper::header::{CONTENT_SECURITY_POLICY, CONTENT_TYPE, HOST, HeaderName, ORIGIN};
+use hyper::header::{
+    CONNECTION, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HOST, HeaderName, HeaderValue, ORIGIN, UPGRADE,
+};
 use hyper::service::service_fn;
+use hyper::upgrade::OnUpgrade;
 use hyper::{Method, Request, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
+use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt as _};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::task::block_in_place;
 use tokio::time::timeout;
+use tokio_rustls::TlsAcceptor;
 
 use crate::access::{self, Asked};
 use crate::desk;
 use crate::operations::{self, Place};
 use crate::server::Server;
 use crate::spool::{Kind, Packing, Spool, SpoolError};
+use crate::tls::{self, HANDSHAKE};
 use crate::wire;
 
 /// What clients may take.
@@ -113,6 +120,7 @@ impl Drop for Guest {
 /// # Errors
 /// The system gives no threads, or the listeners are none.
 pub fn run(server: &Arc<Server>, listeners: Vec<std::net::TcpListener>, limits: Limits) -> io::Result<()> {
+    let acceptor = tls::acceptor(&server.settings.folder, &server.settings.hosts)?;
     // Documents are written to disk where they are read, so a few more threads than that needs.
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(4).enable_all().build()?;
     runtime.block_on(async {
@@ -120,7 +128,8 @@ pub fn run(server: &Arc<Server>, listeners: Vec<std::net::TcpListener>, limits: 
         for listener in listeners {
             listener.set_nonblocking(true)?;
             let listener = TcpListener::from_std(listener)?;
-            tokio::spawn(listen(server.clone(), listener, guests.clone(), limits));
+            let house = House { server: server.clone(), acceptor: acceptor.clone(), limits };
+            tokio::spawn(listen(house, listener, guests.clone()));
         }
         loop {
             tokio::time::sleep(TICK).await;
@@ -129,13 +138,21 @@ pub fn run(server: &Arc<Server>, listeners: Vec<std::net::TcpListener>, limits: 
     })
 }
 
-async fn listen(server: Arc<Server>, listener: TcpListener, guests: Arc<Guests>, limits: Limits) {
+/// What each connection needs.
+#[derive(Clone)]
+struct House {
+    server: Arc<Server>,
+    acceptor: TlsAcceptor,
+    limits: Limits,
+}
+
+async fn listen(house: House, listener: TcpListener, guests: Arc<Guests>) {
     loop {
         match listener.accept().await {
             Ok((stream, peer)) => {
                 // One too many is closed; the others go on.
-                if let Some(guest) = guests.enter(peer.ip().to_canonical(), &limits) {
-                    tokio::spawn(connection(server.clone(), stream, peer, limits, guest));
+                if let Some(guest) = guests.enter(peer.ip().to_canonical(), &house.limits) {
+                    tokio::spawn(connection(house.clone(), stream, peer, Arc::new(guest)));
                 }
             }
             // As where no more files can be opened: there are some again when others have gone.
@@ -144,17 +161,87 @@ async fn listen(server: Arc<Server>, listener: TcpListener, guests: Arc<Guests>,
     }
 }
 
-async fn connection(server: Arc<Server>, stream: TcpStream, peer: SocketAddr, limits: Limits, _guest: Guest) {
+async fn connection(house: House, stream: TcpStream, peer: SocketAddr, guest: Arc<Guest>) {
     // Answers are small, and whoever waits for one should not wait longer.
     let _ = stream.set_nodelay(true);
-    let service = service_fn(|request: Request<Incoming>| {
-        let server = server.clone();
-        async move { Ok::<_, Infallible>(respond(&server, request, peer, &limits).await) }
+    let mut first = [0];
+    match timeout(house.limits.head, stream.peek(&mut first)).await {
+        Ok(Ok(1)) if first[0] == HANDSHAKE => encrypted(house, stream, peer, guest).await,
+        Ok(Ok(1)) => spoken(house, stream, peer, guest, false).await,
+        // Nothing came.
+        _ => {}
+    }
+}
+
+async fn encrypted<S>(house: House, stream: S, peer: SocketAddr, guest: Arc<Guest>)
+where
+    S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
+{
+    if let Ok(Ok(stream)) = timeout(house.limits.head, house.acceptor.accept(stream)).await {
+        spoken(house, stream, peer, guest, true).await;
+    }
+}
+
+/// Requests on a connection, until it is closed or changes over to encryption.
+async fn spoken<S>(house: House, stream: S, peer: SocketAddr, guest: Arc<Guest>, is_encrypted: bool)
+where
+    S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
+{
+    let limits = house.limits;
+    let service = service_fn(|mut request: Request<Incoming>| {
+        let (house, guest) = (house.clone(), guest.clone());
+        async move {
+            if !is_encrypted && wants_encryption(&request) {
+                tokio::spawn(change_over(house, hyper::upgrade::on(&mut request), peer, guest));
+                return Ok(switching());
+            }
+            Ok::<_, Infallible>(respond(&house.server, request, peer, &house.limits, is_encrypted).await)
+        }
     });
     let mut builder = hyper::server::conn::http1::Builder::new();
     builder.timer(TokioTimer::new()).header_read_timeout(limits.head).max_buf_size(64 << 10);
     // What goes wrong here is the client's: it is gone.
-    let _ = builder.serve_connection(TokioIo::new(stream), service).await;
+    let _ = builder.serve_connection(TokioIo::new(stream), service).with_upgrades().await;
+}
+
+/// Whether a client asks for encryption before it sends anything that matters.
+fn wants_encryption(request: &Request<Incoming>) -> bool {
+    let header = |name: HeaderName| request.headers().get(name).and_then(|value| value.to_str().ok());
+    request.method() == Method::OPTIONS
+        && header(UPGRADE).is_some_and(|wanted| wanted.split(',').any(|one| one.trim().starts_with("TLS/")))
+        && header(CONNECTION).is_some_and(|words| words.to_ascii_lowercase().contains("upgrade"))
+}
+
+fn switching() -> Response<Full<Bytes>> {
+    let mut response = Response::new(Full::default());
+    *response.status_mut() = StatusCode::SWITCHING_PROTOCOLS;
+    let headers = response.headers_mut();
+    headers.insert(UPGRADE, HeaderValue::from_static("TLS/1.2,HTTP/1.1"));
+    headers.insert(CONNECTION, HeaderValue::from_static("Upgrade"));
+    response
+}
+
+/// [`changed_over`] without its type, which would hold itself.
+fn change_over(
+    house: House,
+    upgrade: OnUpgrade,
+    peer: SocketAddr,
+    guest: Arc<Guest>,
+) -> Pin<Box<dyn Future<Output = ()> + Send>> {
+    Box::pin(changed_over(house, upgrade, peer, guest))
+}
+
+/// The connection behind a change to encryption. The request that asked for it is answered there first.
+async fn changed_over(house: House, upgrade: OnUpgrade, peer: SocketAddr, guest: Arc<Guest>) {
+    let Ok(Ok(stream)) = timeout(house.limits.head, upgrade).await else { return };
+    let Ok(Ok(mut stream)) = timeout(house.limits.head, house.acceptor.accept(TokioIo::new(stream))).await
+    else {
+        return;
+    };
+    let answer = b"HTTP/1.1 200 OK\r\nContent-Length: 0\r\nAllow: GET, HEAD, OPTIONS, POST\r\n\r\n";
+    if stream.write_all(answer).await.is_ok() && stream.flush().await.is_ok() {
+        spoken(house, stream, peer, guest, true).await;
+    }
 }
 
 /// An answer of this type.
@@ -162,18 +249,18 @@ pub fn plain(status: StatusCode, kind: &'static str, body: impl Into<Bytes>) -> 
     let mut response = Response::new(Full::new(body.into()));
     *response.status_mut() = status;
     let headers = response.headers_mut();
-    headers.insert(CONTENT_TYPE, hyper::header::HeaderValue::from_static(kind));
+    headers.insert(CONTENT_TYPE, HeaderValue::from_static(kind));
     for (name, value) in [
         ("x-content-type-options", "nosniff"),
         ("x-frame-options", "DENY"),
         ("referrer-policy", "no-referrer"),
         ("cache-control", "no-store"),
     ] {
-        headers.insert(HeaderName::from_static(name), hyper::header::HeaderValue::from_static(value));
+        headers.insert(HeaderName::from_static(name), HeaderValue::from_static(value));
     }
     headers.insert(
         CONTENT_SECURITY_POLICY,
-        hyper::header::HeaderValue::from_static(
+        HeaderValue::from_static(
             "default-src 'none'; img-src 'self' data: blob:; style-src 'self'; script-src 'self'; connect-src 'self'; \
              frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
         ),
@@ -191,6 +278,7 @@ async fn respond(
     request: Request<Incoming>,
     peer: SocketAddr,
     limits: &Limits,
+    is_encrypted: bool,
 ) -> Response<Full<Bytes>> {
     let header = |name: &HeaderName| request.headers().get(name).and_then(|value| value.to_str().ok());
     let (host, origin, code) = (header(&HOST), header(&ORIGIN), header(&CODE));
@@ -206,7 +294,7 @@ async fn respond(
         (&Method::POST, path) if kind == "application/ipp" => {
             let printer = path.trim_matches('/').strip_prefix("ipp/print").unwrap_or("");
             let printer = printer.trim_matches('/').to_owned();
-            let place = Place { host, is_encrypted: false, printer };
+            let place = Place { host, is_encrypted, printer };
             ipp(server, request.into_body(), &place, limits).await
         }
         (&Method::GET | &Method::HEAD, path) => {

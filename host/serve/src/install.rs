@@ -216,6 +216,7 @@ pub fn keys(preset: &Preset, uuid: &str) -> Vec<(&'static str, String)> {
         ("UUID", uuid.into()),
         ("mopria-certified", "1.3".into()),
         ("air", "none".into()),
+        ("TLS", "1.2".into()),
     ]
 }
 
@@ -234,6 +235,13 @@ fn advertisement(preset: &Preset, uuid: &str, port: u16) -> String {
          <type>_ipp._tcp</type>\n    \
          <subtype>_print._sub._ipp._tcp</subtype>\n    \
          <subtype>_universal._sub._ipp._tcp</subtype>\n    \
+         <port>{port}</port>\n\
+         {records}  \
+         </service>\n  \
+         <service>\n    \
+         <type>_ipps._tcp</type>\n    \
+         <subtype>_print._sub._ipps._tcp</subtype>\n    \
+         <subtype>_universal._sub._ipps._tcp</subtype>\n    \
          <port>{port}</port>\n\
          {records}  \
          </service>\n\

@@ -221,11 +221,11 @@ pub fn after_restart(job: &mut Job, now: u64) {
 }
 
 #[cfg(test)]
-pub mod tests {
+mod tests {
     use super::*;
 
     /// A job of this number in this state.
-    pub fn job(id: u32, state: State) -> Job {
+    fn job(id: u32, state: State) -> Job {
         Job {
             id,
             printer: "standard".into(),

@@ -20,6 +20,7 @@ pub mod printer;
 pub mod server;
 pub mod spool;
 pub mod template;
+pub mod tls;
 pub mod values;
 pub mod wire;
 pub mod worker;

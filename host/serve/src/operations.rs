@@ -54,7 +54,11 @@ pub struct Place {
 impl Place {
     /// The address of a printer.
     pub fn printer(&self, name: &str) -> String {
-        let scheme = if self.is_encrypted { "ipps" } else { "ipp" };
+        self.as_scheme(if self.is_encrypted { "ipps" } else { "ipp" }, name)
+    }
+
+    /// The same with or without encryption.
+    pub fn as_scheme(&self, scheme: &str, name: &str) -> String {
         format!("{scheme}://{}/ipp/print/{name}", self.host)
     }
 

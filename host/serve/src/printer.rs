@@ -113,7 +113,6 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
         false => keywords(data.reasons.iter().map(|reason| reason.keyword())),
     };
     let queued = data.jobs.values().filter(|job| !job.state.is_over() && job.printer == preset.name).count();
-    let address = place.printer(&preset.name);
     let names: Vec<String> = SHEETS.iter().map(|(keyword, _)| (*keyword).into()).collect();
     let media = names.iter().cloned().chain(custom());
     let mut formats: Vec<&str> = vec!["application/octet-stream"];
@@ -232,7 +231,11 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
             list(cartridges.iter().map(|found| integer(if found.is_loaded { -3 } else { 0 }))),
         ),
         (D, "printer-up-time", integer(up)),
-        (D, "printer-uri-supported", uri(&address)),
+        (
+            D,
+            "printer-uri-supported",
+            list(["ipp", "ipps"].map(|scheme| uri(&place.as_scheme(scheme, &preset.name)))),
+        ),
         (D, "printer-uuid", uri(&format!("urn:uuid:{uuid}"))),
         (D, "pwg-raster-document-resolution-supported", list(queue::raster::RESOLUTIONS.map(dpi))),
         (D, "pwg-raster-document-sheet-back", keyword("normal")),
@@ -243,8 +246,8 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
         ),
         (D, "queued-job-count", integer(queued)),
         (D, "urf-supported", keywords(URF)),
-        (D, "uri-authentication-supported", keyword("none")),
-        (D, "uri-security-supported", keyword(if place.is_encrypted { "tls" } else { "none" })),
+        (D, "uri-authentication-supported", keywords(["none", "none"])),
+        (D, "uri-security-supported", keywords(["none", "tls"])),
         (D, "which-jobs-supported", keywords(["completed", "not-completed", "all"])),
         (T, "copies-default", integer(1)),
         (T, "copies-supported", range(1, MOST_COPIES)),

@@ -109,3 +109,27 @@ fn ipptool_finds_nothing_missing_and_every_sample_is_printed() {
         .collect();
     assert!(bad.is_empty(), "{bad:?}");
 }
+
+/// The same printer encrypted: from the first byte on, and by a change in the middle, with the print system's own client.
+#[test]
+fn a_client_that_wants_encryption_gets_it_in_both_ways() {
+    if !Path::new("/usr/bin/ipptool").exists() {
+        return Need::Queue.skip("ipptool is not installed; `cargo xtask queue` installs it");
+    }
+    let running = Running::start(Limits::default(), false);
+    let port = running.address.port();
+    for (option, scheme) in [("-tv", "ipp"), ("-tvE", "ipp"), ("-tv", "ipps")] {
+        let output = Command::new("ipptool")
+            .args([option, &format!("{scheme}://localhost:{port}/ipp/print/standard")])
+            .arg(Path::new(FILES).join("get-printer-attributes.test"))
+            // The client remembers certificates in its user's folder.
+            .env("HOME", running.path("."))
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(output.status.success() && said.contains("[PASS]"), "{option} {scheme}: {said}");
+        // What it is told of itself is encrypted if the connection is.
+        let is_encrypted = said.contains(&format!("printer-more-info (uri) = https://localhost:{port}/"));
+        assert_eq!(is_encrypted, (option, scheme) != ("-tv", "ipp"), "{option} {scheme}: {said}");
+    }
+}
