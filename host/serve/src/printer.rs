@@ -125,7 +125,7 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
     let none = Cartridge { name: "unknown".into(), colour: "none", is_loaded: true };
     let cartridges =
         if data.cartridges.is_empty() { std::slice::from_ref(&none) } else { &data.cartridges[..] };
-    let supplies = cartridges.iter().enumerate();
+    let supplies = (1..).zip(cartridges);
     let colour = preset.choices.colours.len() > 1;
     const D: &str = "printer-description";
     const T: &str = "job-template";
@@ -219,7 +219,7 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
         (D, "printer-state-change-time", integer(data.changed.saturating_sub(began))),
         (D, "printer-state-message", text(&data.message)),
         (D, "printer-state-reasons", reasons),
-        (D, "printer-supply", list(supplies.clone().map(|(at, found)| octets(&supply(at + 1, found))))),
+        (D, "printer-supply", list(supplies.clone().map(|(index, found)| octets(&supply(index, found))))),
         (D, "printer-supply-description", list(supplies.map(|(_, found)| text(&found.name)))),
         (D, "printer-supply-info-uri", uri(&place.page(""))),
         (D, "marker-names", list(cartridges.iter().map(|found| name(&found.name)))),
