@@ -5,7 +5,7 @@
 //! when the process ended is pending again: what of it is printed the delivery's own journal knows, so it goes on behind that.
 //! The order at the end of a job is: its end on record, then the journal's records of its sheets removed, then its document. So there is
 //! no step after which a restart would print it again.
-//! Cost: two syncs for each change of a job's state. Limits: the records of the last [`KEPT`] ended jobs stay.
+//! Cost: two syncs for each change of a job's state. Limits: the records of the last hundred ended jobs stay.
 //! Source: RFC 8011, section 5.3.7, for the states.
 
 use std::collections::BTreeMap;
