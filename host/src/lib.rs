@@ -1,7 +1,7 @@
-//! The program: [`cli`] for people, [`queue`] for the print system.
+//! The program: what people type, and what the print system starts.
 //!
-//! It turns arguments into settings and results into words; the work is done by the crates below it: `appearance`, `press` and
-//! `device`. `docs/code.md` leads from each command to its module.
+//! It turns arguments into settings and results into words; the work is done by the crates below it: `appearance`, `press`,
+//! `device` and `queue`. `docs/code.md` leads from each command to its module.
 //!
 //! Casts that can lose a value are not allowed here: numbers come from command lines, print systems and raster headers, so
 //! they are converted with a check or an error. `cast_possible_wrap` stays off: what becomes signed is a count of dots or
@@ -12,4 +12,3 @@
 pub mod cli;
 mod folders;
 mod libraries;
-pub mod queue;

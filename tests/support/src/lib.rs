@@ -8,7 +8,9 @@
 pub mod browser;
 pub mod damage;
 pub mod device;
+pub mod ipp;
 pub mod program;
+pub mod pwg;
 
 pub use needs;
 

@@ -24,7 +24,17 @@ pub fn path() -> &'static Path {
         let test = std::env::current_exe().expect("a test has a file");
         let folder = test.parent().and_then(Path::parent).expect("cargo keeps tests two folders down");
         let mut build = Command::new(std::env::var_os("CARGO").unwrap_or("cargo".into()));
-        build.args(["build", "--quiet", "--locked", "--package", "foilpress", "--bin", "foilpress"]);
+        build.args([
+            "build",
+            "--quiet",
+            "--locked",
+            "--package",
+            "foilpress",
+            "--bin",
+            "foilpress",
+            "--features",
+            "serve",
+        ]);
         if folder.ends_with("release") {
             build.arg("--release");
         }

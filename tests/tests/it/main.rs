@@ -12,4 +12,6 @@ mod pass_streams;
 mod queue;
 mod reference_renderer;
 #[cfg(unix)]
+mod serve;
+#[cfg(unix)]
 mod shown;

@@ -20,9 +20,10 @@ use protocol::ink::Ink;
 use testing::program::{self, small_document};
 
 /// Commands that are not run here, by their first words, and why.
-const ELSEWHERE: [(&str, &str); 20] = [
+const ELSEWHERE: [(&str, &str); 21] = [
     ("foilpress bridge flash", "needs a board in its boot loader: tests/it/emulator/flash.rs"),
     ("foilpress queue", "changes the computer's print system: tests/it/queue/system.rs"),
+    ("foilpress serve", "runs until Ctrl-C: tests/it/serve/mod.rs"),
     ("lp ", "needs a print server: tests/it/queue/mod.rs"),
     ("gs ", "is Ghostscript's own"),
     ("cargo ", "is the build itself, and the gate"),
@@ -44,7 +45,7 @@ const ELSEWHERE: [(&str, &str); 20] = [
 ];
 
 /// Documents that show commands, and the folder these are typed in.
-const DOCUMENTS: [(&str, &str); 14] = [
+const DOCUMENTS: [(&str, &str); 15] = [
     ("README.md", "."),
     ("docs/guide.md", "."),
     ("docs/guide/charts.md", "."),
@@ -56,6 +57,7 @@ const DOCUMENTS: [(&str, &str); 14] = [
     ("docs/guide/page.md", "."),
     ("docs/guide/preview.md", "."),
     ("docs/guide/queue.md", "."),
+    ("docs/guide/serve.md", "."),
     ("docs/emulator.md", "."),
     ("docs/measuring-inks.md", "."),
     ("docs/wiring.md", "."),

@@ -326,10 +326,14 @@ impl Delivery<'_> {
         }
     }
 
-    /// Waits, without limit, until the printer says that the sheet of this job is done; `watch` is told what is the matter with it,
+    /// Waits, as long as the caller does, until the printer says that the sheet of this job is done; `watch` is told what is the matter with it,
     /// once for each change. Nothing that happens here changes that the job was sent.
     pub fn await_sheet(&self, job: u32, address: &Address, watch: &mut dyn FnMut(&[String])) -> Sheet {
-        let (mut open, mut pause) = (|| self.caller.open(address, None), |time| self.caller.pause(time));
+        let mut open = || self.caller.open(address, None);
+        let mut pause = |time| {
+            self.caller.pause(time);
+            self.caller.watches()
+        };
         await_sheet(job, &mut open, &mut pause, watch)
             .unwrap_or_else(|error| Sheet::Unknown(with_causes(&error)))
     }

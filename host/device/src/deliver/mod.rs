@@ -67,6 +67,11 @@ pub trait Caller {
         Wish::GoOn
     }
 
+    /// Whether to wait on for a sheet that was sent.
+    fn watches(&self) -> bool {
+        true
+    }
+
     /// Watches the stages in which a job is prepared.
     fn observer(&self) -> &dyn Observer;
 

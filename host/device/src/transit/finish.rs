@@ -55,11 +55,11 @@ fn unknown(why: &str) -> Sheet {
 }
 
 /// Waits, without limit, until the printer says that it is done with this job, asking every few seconds. `watch` is told what is the
-/// matter with the printer, once for each change; nothing when all is well again.
+/// matter with the printer, once for each change; nothing when all is well again. `pause` says whether to go on.
 pub(crate) fn await_sheet(
     job: u32,
     open: &mut dyn FnMut() -> Result<Box<dyn Transport>, OpenError>,
-    pause: &mut dyn FnMut(Duration),
+    pause: &mut dyn FnMut(Duration) -> bool,
     watch: &mut dyn FnMut(&[String]),
 ) -> Result<Sheet, FinishError> {
     let mut link = open()?;
@@ -111,6 +111,8 @@ pub(crate) fn await_sheet(
         if unanswered == most {
             return Ok(unknown("the printer does not answer"));
         }
-        pause(EVERY);
+        if !pause(EVERY) {
+            return Ok(unknown("nobody waits for it any more"));
+        }
     }
 }

@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use clap::Args as ClapArgs;
 use clap_complete::Shell;
 
-use crate::queue::install::{Places, put};
+use queue::install::{Places, put};
 
 /// Where a package puts the program.
 const PROGRAM: &str = "/usr/bin/foilpress";

@@ -397,6 +397,40 @@ pub struct PlanArgs {
     output: PlanOutputArgs,
 }
 
+impl Args {
+    /// The same choices as a print dialog makes them, for documents that come from elsewhere.
+    #[cfg(feature = "serve")]
+    pub fn choices(&self, observer: &dyn Observer) -> Result<queue::options::Choices> {
+        use queue::options::{Choices, Place, Spots};
+        let Work { layers, layout, media, .. } = &self.work;
+        let (settings, layout, handling) = (layers.settings()?, layout.layout(observer)?, media.handling());
+        let process = InkSet::of([Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black]);
+        Ok(Choices {
+            media: handling.media,
+            curl_correction: handling.curl_correction,
+            colours: InkSet::of(settings.inks.iter().filter(|&ink| process.contains(ink))),
+            spots: if layers.reserved { Spots::Reserved } else { Spots::Named },
+            foils: settings.inks.iter().any(|ink| ink.kind() == protocol::ink::Kind::Foil),
+            white: settings.white.unwrap_or(White::None),
+            finish: settings.finish.unwrap_or(Finish::None),
+            dpi: 600,
+            intent: settings.intent,
+            gamma: settings.gamma,
+            halftone: settings.halftone,
+            place: match layout.position {
+                layout::Position::FromEdge(corner) => Place::At(corner),
+                layout::Position::FromPrintable(_) | layout::Position::Centred => Place::Page,
+            },
+            mirror: layout.mirror,
+            custom_paper: false,
+            profile: layout.profile,
+            pages: Vec::new(),
+            paper: layout.paper,
+            more: settings,
+        })
+    }
+}
+
 impl Work {
     /// Reads the art, composes it, and hands what is to be printed and its layout to `then`.
     fn with<T>(

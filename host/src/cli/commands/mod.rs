@@ -24,6 +24,7 @@ pub mod queue;
 pub mod resume;
 pub mod sample;
 pub mod send;
+pub mod serve;
 pub mod steps;
 
 use anyhow::Result;
@@ -112,6 +113,10 @@ pub enum Command {
     /// Turns series of exposures of a print round a can, with a grey card in the picture, into an ink library with curves,
     /// their uncertainty and their provenance.
     Measure(measure::Args),
+    /// Be a printer for every device of the house, without drivers
+    ///
+    /// Phones, tablets, Windows, macOS and Linux print to it as to any other printer on the network (IPP Everywhere).
+    Serve(serve::Args),
     /// Install, remove and list print queues of the system
     Queue(queue::Args),
     /// Deliver a job to the printer (called by the print system)
@@ -159,6 +164,7 @@ impl Command {
             Command::Inks(args) => inks::run(args, observer),
             Command::Measure(args) => measure::run(&args, observer),
             Command::Generate(args) => generate::run(&args, program),
+            Command::Serve(args) => serve::run(&args, program),
             Command::Queue(args) => queue::run(&args, observer),
             Command::Sample(args) => sample::run(args),
             // `main` has run these already.

@@ -160,6 +160,13 @@ fn names() -> Result<Vec<String>> {
     Ok(names)
 }
 
+/// The presets that can be used, with their options as words.
+#[cfg(feature = "serve")]
+pub fn all() -> Result<Vec<(String, Vec<String>)>> {
+    let loaded = names()?.into_iter().map(|name| Ok((name.clone(), Preset::load(&name)?.1)));
+    loaded.collect()
+}
+
 fn presets() -> Result<PathBuf> {
     Ok(folders::config()?.join("presets"))
 }

@@ -13,14 +13,14 @@ use inks::Library;
 use serde_json::json;
 
 use crate::cli::console::{chain, show, stderr, stdout};
-use crate::queue::call::{Call, Exit};
-use crate::queue::install::{self, Places};
-use crate::queue::messages::Messages;
-use crate::queue::options::{self, Choices};
-use crate::queue::{backend, filter, listing, ppd, uri};
 use device::printers::{self, Printers};
 use observe::{Observer, with_causes};
 use press::layout::Profile;
+use queue::call::{Call, Exit};
+use queue::install::{self, Places};
+use queue::messages::{Messages, Report as _};
+use queue::options::{self, Choices};
+use queue::{backend, filter, listing, ppd, uri};
 
 /// Arguments of `queue`.
 #[derive(ClapArgs, Debug)]

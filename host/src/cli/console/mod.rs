@@ -101,8 +101,8 @@ mod tests {
     use observe::Diagnosis;
 
     use super::*;
-    use crate::queue::filter::FilterError;
-    use crate::queue::raster::RasterError;
+    use queue::filter::FilterError;
+    use queue::raster::RasterError;
 
     fn path() -> PathBuf {
         "somewhere".into()

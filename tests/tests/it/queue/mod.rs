@@ -1,7 +1,7 @@
 //! A real print server, the program as its backend and filter, a bridge on a socket: what users of a queue do and see.
 
 mod bridge;
-mod server;
+pub(crate) mod server;
 mod system;
 
 use bridge::Bridge;
@@ -48,7 +48,7 @@ fn pdf(pages: &[&str]) -> Vec<u8> {
 }
 
 /// A document of pages of a size in points, with what they draw with, and the table of places a PDF has.
-fn document((width, length): (u32, u32), resources: &str, pages: &[&str]) -> Vec<u8> {
+pub(crate) fn document((width, length): (u32, u32), resources: &str, pages: &[&str]) -> Vec<u8> {
     let mut objects = vec!["<</Type/Catalog/Pages 2 0 R>>".to_owned()];
     let kids: Vec<String> = (0..pages.len()).map(|i| format!("{} 0 R", 3 + 2 * i)).collect();
     objects.push(format!("<</Type/Pages/Kids[{}]/Count {}>>", kids.join(" "), pages.len()));
@@ -86,7 +86,7 @@ fn printed(bridge: &Bridge) -> Vec<Vec<Pass>> {
 }
 
 /// Columns and rows of the rectangle around the dots of an ink, ends excluded, and the number of dots.
-fn extent(sheet: &[Pass], ink: Ink) -> ([usize; 4], u64) {
+pub(crate) fn extent(sheet: &[Pass], ink: Ink) -> ([usize; 4], u64) {
     let Some(pass) = sheet.iter().find(|pass| pass.ink == ink) else { return ([0; 4], 0) };
     let plane = &pass.plane;
     let mut sides = [usize::MAX, usize::MAX, 0, 0];
@@ -575,7 +575,7 @@ fn the_print_system_finds_the_backend_and_takes_the_printer_description() {
     let server = server!();
     let found = server.say("lpinfo", &["-v"]);
     assert!(found.lines().any(|line| line.contains("foilpress")), "{found}");
-    let description = server.path("files").join(foilpress::queue::install::DESCRIPTION);
+    let description = server.path("files").join(queue::install::DESCRIPTION);
     // The print system's own judge; the filters it looks for are not in the system's folders.
     let judged =
         server.command("cupstestppd", &["-I", "filters", "-W", "none", description.to_str().unwrap()]);

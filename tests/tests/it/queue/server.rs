@@ -1,8 +1,8 @@
 //! A print server of its own: configuration, spool and programs in a temporary folder, on loopback, no system service.
 
-use foilpress::queue::install::{DESCRIPTION, Places, put};
-use foilpress::queue::ppd;
 use press::layout::Profile;
+use queue::install::{DESCRIPTION, Places, put};
+use queue::ppd;
 use std::fs;
 use std::net::{TcpListener, TcpStream};
 use std::os::unix::fs::{PermissionsExt as _, symlink};

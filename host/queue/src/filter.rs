@@ -37,7 +37,10 @@ use press::layout::Cut;
 use press::pipeline::JobError;
 
 /// The largest document.
-const LARGEST: u64 = 1 << 30;
+pub const LARGEST: u64 = 1 << 30;
+
+/// How pictures without a page begin, and how their files end.
+const PICTURES: [(&[u8], &str); 2] = [(b"\xff\xd8\xff", ".jpg"), (b"\x89PNG", ".png")];
 
 /// Why a document is not printed.
 #[derive(Debug, thiserror::Error)]
@@ -45,9 +48,9 @@ pub enum FilterError {
     /// The options of the job.
     #[error(transparent)]
     Choice(#[from] NoChoice),
-    /// Neither PDF nor raster.
+    /// A kind that is not read.
     #[error(
-        "the document is neither PDF nor PWG raster; install the print system's filters to convert other files"
+        "the document is neither PDF nor raster, JPEG or PNG; install the print system's filters to convert other files"
     )]
     Kind,
     /// Nothing to print, as where no page was selected.
@@ -174,11 +177,25 @@ pub fn run(
     })?;
     let mut press = Press { choices, library, out, observer, jobs: 0, white: 0, in_margins: None };
     if head == raster::SYNC {
-        pictures(document, &mut press)?;
+        pictures(raster::Reader::behind_sync(BufReader::with_capacity(1 << 16, document)), &mut press)?;
+    } else if raster::APPLE.starts_with(&head) {
+        let mut rest = [0; raster::APPLE.len() - 4];
+        let read = document.read_exact(&mut rest);
+        if read.is_err() || !raster::APPLE.ends_with(&rest) {
+            return Err(FilterError::Kind);
+        }
+        let document = BufReader::with_capacity(1 << 16, document);
+        pictures(raster::Reader::behind_apple(document)?, &mut press)?;
+    } else if let Some((_, ending)) = PICTURES.iter().find(|(magic, _)| head.starts_with(magic)) {
+        let job = match file {
+            Some(path) => press.picture(path)?,
+            None => press.picture(spooled(&mut head.chain(document), ending)?.path())?,
+        };
+        press.write(&job)?;
     } else if head.starts_with(b"%PDF") || head.starts_with(b"%!") {
         match file {
             Some(path) => pages(path, &mut press)?,
-            None => pages(spooled(&mut head.chain(document))?.path(), &mut press)?,
+            None => pages(spooled(&mut head.chain(document), ".pdf")?.path(), &mut press)?,
         }
     } else {
         return Err(FilterError::Kind);
@@ -192,16 +209,16 @@ pub fn run(
 }
 
 /// A document as a file, which Ghostscript would make of it, too.
-fn spooled(document: &mut dyn Read) -> Result<NamedTempFile, FilterError> {
-    let mut file = NamedTempFile::new().map_err(io_error("keep the document"))?;
+fn spooled(document: &mut dyn Read, ending: &str) -> Result<NamedTempFile, FilterError> {
+    let made = tempfile::Builder::new().suffix(ending).tempfile();
+    let mut file = made.map_err(io_error("keep the document"))?;
     let length =
         io::copy(&mut document.take(LARGEST + 1), &mut file).map_err(io_error("keep the document"))?;
     if length > LARGEST { Err(FilterError::TooLarge) } else { Ok(file) }
 }
 
 /// Pictures of pages, from the print system.
-fn pictures(document: impl Read, press: &mut Press<'_>) -> Result<(), FilterError> {
-    let mut reader = raster::Reader::behind_sync(BufReader::with_capacity(1 << 16, document));
+fn pictures(mut reader: raster::Reader<impl Read>, press: &mut Press<'_>) -> Result<(), FilterError> {
     let (mut number, mut row) = (0, Vec::new());
     while let Some(page) = reader.next_page()? {
         number += 1;

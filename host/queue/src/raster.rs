@@ -1,15 +1,21 @@
-//! Pages of PWG raster, the format in which print systems pass on pictures of pages.
+//! Pages of PWG raster and Apple raster, the formats in which print systems and phones pass on pictures of pages.
 //!
 //! Method: header and rows are read as they come; a row is unpacked into red, green and blue. Grey and black-and-white
-//! pages become colours of equal parts.
-//! Cost: one row of memory. Limits: sRGB, sGrey and black, 8 bits (black also 1), 300 or 600 dpi, whole sheets.
-//! Source: PWG 5102.4.
+//! pages become colours of equal parts, and cyan, magenta, yellow and black those that PDF says ink leaves: (1 - c)(1 - k). The two
+//! formats pack rows alike and differ in their headers.
+//! Cost: one row of memory. Limits: sRGB, sGrey, CMYK and black, 8 bits (sRGB also 16, black also 1), the [`RESOLUTIONS`], whole sheets.
+//! Source: PWG 5102.4; ISO 32000-1, 10.3.5; for Apple raster, which has no public text, the readers of CUPS and of `print_raster`.
 
 use std::io::{self, Read};
 
-/// How a stream begins.
+/// How a stream of PWG raster begins.
 pub const SYNC: [u8; 4] = *b"RaS2";
+/// How a stream of Apple raster begins; a zero and the number of pages follow.
+pub const APPLE: [u8; 8] = *b"UNIRAST\0";
+/// Pixels per inch that pages are read at.
+pub const RESOLUTIONS: [u16; 6] = [150, 180, 300, 360, 600, 720];
 const HEADER: usize = 1796;
+const APPLE_HEADER: usize = 32;
 
 /// Why a stream cannot be printed.
 #[derive(Debug, thiserror::Error)]
@@ -42,7 +48,11 @@ pub enum RasterError {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Colours {
     Rgb,
+    /// 16 bits, the high byte first. Eight are more than dots show.
+    Rgb16,
     Grey,
+    /// More is darker.
+    Cmyk,
     /// 8 bits, more is darker.
     Black,
     /// 1 bit, set is black.
@@ -67,6 +77,7 @@ pub struct Page {
 /// Reads pages one after the other.
 pub struct Reader<R> {
     input: R,
+    is_apple: bool,
     number: usize,
     page: Option<Page>,
     row: usize,
@@ -78,7 +89,17 @@ pub struct Reader<R> {
 impl<R: Read> Reader<R> {
     /// A reader of a stream whose first four bytes have been read and are [`SYNC`].
     pub fn behind_sync(input: R) -> Reader<R> {
-        Reader { input, number: 0, page: None, row: 0, repeat: 0, line: Vec::new() }
+        Reader { input, is_apple: false, number: 0, page: None, row: 0, repeat: 0, line: Vec::new() }
+    }
+
+    /// A reader of Apple raster whose first bytes, [`APPLE`], have been read.
+    ///
+    /// # Errors
+    /// The stream ends there.
+    pub fn behind_apple(mut input: R) -> Result<Reader<R>, RasterError> {
+        // The number of pages, which is 0 where the writer did not know it.
+        input.read_exact(&mut [0; 4])?;
+        Ok(Reader { is_apple: true, ..Reader::behind_sync(input) })
     }
 
     /// The next page; `None` at the end. Unread rows of the page before are skipped.
@@ -88,28 +109,29 @@ impl<R: Read> Reader<R> {
             self.row(&mut scratch)?;
         }
         let mut header = [0; HEADER];
+        let header = if self.is_apple { &mut header[..APPLE_HEADER] } else { &mut header[..] };
         if self.input.read(&mut header[..1])? == 0 {
             return Ok(None);
         }
         self.input.read_exact(&mut header[1..])?;
         self.number += 1;
-        let page = self.check(&header)?;
+        let page = self.check(header)?;
         (self.page, self.row, self.repeat) = (Some(page), 0, 0);
         Ok(Some(page))
     }
 
-    fn check(&self, header: &[u8; HEADER]) -> Result<Page, RasterError> {
+    fn check(&self, header: &[u8]) -> Result<Page, RasterError> {
         let number =
             |at: usize| u32::from_be_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]]);
         let wrong =
             |field, found: String, expected| RasterError::Field { page: self.number, field, found, expected };
-        let (x, y) = (number(276), number(280));
-        let dpi = match (x, y) {
-            (300, 300) => 300,
-            (600, 600) => 600,
-            _ => return Err(wrong("HWResolution", format!("{x} x {y}"), "600 x 600 or 300 x 300")),
+        let (x, y, width, height) = match self.is_apple {
+            true => (number(20), number(20), number(12), number(16)),
+            false => (number(276), number(280), number(372), number(376)),
         };
-        let (width, height) = (number(372), number(376));
+        let dpi = RESOLUTIONS.into_iter().find(|&dpi| x == u32::from(dpi) && x == y).ok_or_else(|| {
+            wrong("HWResolution", format!("{x} x {y}"), "150, 180, 300, 360, 600 or 720 in both directions")
+        })?;
         // The longest sheet is 14 inches, and no sheet is wider than long.
         let most = 15 * u32::from(dpi);
         if width == 0 || height == 0 || width > most || height > most {
@@ -119,29 +141,53 @@ impl<R: Read> Reader<R> {
                 "the pixel size of a sheet",
             ));
         }
-        let (bits, pixel, space, order) = (number(384), number(388), number(400), number(396));
-        let colours = match (space, bits, pixel) {
-            (19 | 1, 8, 24) => Colours::Rgb,
-            (18 | 0, 8, 8) => Colours::Grey,
-            (3, 8, 8) => Colours::Black,
-            (3, 1, 1) => Colours::Bits,
-            _ => {
-                return Err(wrong(
-                    "cupsColorSpace",
-                    format!("{space} with {bits} bits a colour"),
-                    "19 (sRGB) or 18 (sGrey) with 8 bits, or 3 (black)",
-                ));
+        let (pixel, colours, copies) = match self.is_apple {
+            true => {
+                let (pixel, space) = (u32::from(header[0]), header[1]);
+                let colours = match (space, pixel) {
+                    (1 | 5, 24) => Colours::Rgb,
+                    (0 | 4, 8) => Colours::Grey,
+                    (6, 32) => Colours::Cmyk,
+                    _ => {
+                        let found = format!("{space} with {pixel} bits a pixel");
+                        return Err(wrong(
+                            "colour space",
+                            found,
+                            "0 (grey), 1 (sRGB) or 6 (CMYK) with 8 bits",
+                        ));
+                    }
+                };
+                (pixel, colours, 1)
+            }
+            false => {
+                let (bits, pixel, space, order) = (number(384), number(388), number(400), number(396));
+                let colours = match (space, bits, pixel) {
+                    (19 | 1, 8, 24) => Colours::Rgb,
+                    (19 | 1, 16, 48) => Colours::Rgb16,
+                    (18 | 0, 8, 8) => Colours::Grey,
+                    (6, 8, 32) => Colours::Cmyk,
+                    (3, 8, 8) => Colours::Black,
+                    (3, 1, 1) => Colours::Bits,
+                    _ => {
+                        return Err(wrong(
+                            "cupsColorSpace",
+                            format!("{space} with {bits} bits a colour"),
+                            "19 (sRGB) with 8 or 16 bits, 18 (sGrey) or 6 (CMYK) with 8, or 3 (black)",
+                        ));
+                    }
+                };
+                if order != 0 {
+                    return Err(wrong("cupsColorOrder", order.to_string(), "0 (chunky)"));
+                }
+                (pixel, colours, number(340).clamp(1, 1000))
             }
         };
-        if order != 0 {
-            return Err(wrong("cupsColorOrder", order.to_string(), "0 (chunky)"));
-        }
         let line = (width * pixel).div_ceil(8);
-        if number(392) != line {
+        if !self.is_apple && number(392) != line {
             return Err(wrong("cupsBytesPerLine", number(392).to_string(), "the bytes of one row of pixels"));
         }
         let (width, height, line) = (width as usize, height as usize, line as usize);
-        Ok(Page { width, height, dpi, copies: number(340).clamp(1, 1000), colours, line })
+        Ok(Page { width, height, dpi, copies, colours, line })
     }
 
     /// The next row of the page, three bytes a pixel.
@@ -158,7 +204,14 @@ impl<R: Read> Reader<R> {
         rgb.clear();
         match page.colours {
             Colours::Rgb => rgb.extend_from_slice(&self.line),
+            Colours::Rgb16 => rgb.extend(self.line.iter().step_by(2)),
             Colours::Grey => rgb.extend(self.line.iter().flat_map(|&v| [v; 3])),
+            Colours::Cmyk => rgb.extend(self.line.as_chunks::<4>().0.iter().flat_map(|&[c, m, y, k]| {
+                [c, m, y].map(|ink| {
+                    let light = u32::from(255 - ink) * u32::from(255 - k);
+                    u8::try_from((light + 127) / 255).unwrap_or(255)
+                })
+            })),
             Colours::Black => rgb.extend(self.line.iter().flat_map(|&v| [255 - v; 3])),
             Colours::Bits => rgb.extend((0..page.width).flat_map(|x| {
                 let black = self.line[x / 8] << (x % 8) & 0x80 != 0;
@@ -176,8 +229,13 @@ impl<R: Read> Reader<R> {
 
     /// Unpacks runs of pixels: one pixel repeated, or several pixels as they are; 128 is paper to the end of the row.
     fn unpack(&mut self, page: &Page) -> Result<(), RasterError> {
-        let pixel = if page.colours == Colours::Rgb { 3 } else { 1 };
-        let paper = if matches!(page.colours, Colours::Black | Colours::Bits) { 0 } else { 255 };
+        let (pixel, paper) = match page.colours {
+            Colours::Rgb => (3, 255),
+            Colours::Rgb16 => (6, 255),
+            Colours::Grey => (1, 255),
+            Colours::Cmyk => (4, 0),
+            Colours::Black | Colours::Bits => (1, 0),
+        };
         self.line.clear();
         while self.line.len() < page.line {
             let start = self.line.len();
@@ -265,6 +323,48 @@ mod tests {
     }
 
     #[test]
+    fn cyan_magenta_yellow_and_black_leave_what_they_do_not_take() {
+        let mut stream = header(4, 1, 6, 8, 32);
+        // Cyan, black, half black over half yellow, and paper to the end.
+        stream.extend([0, 254, 255, 0, 0, 0, 0, 0, 0, 255, 0, 0, 128, 128, 128]);
+        let [row] = &rows(&stream).unwrap()[0][..] else { panic!("one row") };
+        assert_eq!(row, &[0, 255, 255, 0, 0, 0, 127, 127, 63, 255, 255, 255]);
+        // Of sixteen bits the first eight count.
+        let mut stream = header(2, 1, 19, 16, 48);
+        stream.extend([0, 0, 1, 99, 2, 99, 3, 99, 128]);
+        assert_eq!(rows(&stream).unwrap()[0][0], [1, 2, 3, 255, 255, 255]);
+    }
+
+    #[test]
+    fn apple_raster_is_read_as_the_same_rows_behind_another_header() {
+        let mut pages = Vec::new();
+        for (bits, space, row) in [(24u8, 1u8, &[1u8, 1, 10, 20, 30, 128][..]), (8, 0, &[0, 254, 7, 8, 9])] {
+            let mut stream = APPLE.to_vec();
+            stream.extend(1u32.to_be_bytes());
+            let mut header = [0; APPLE_HEADER];
+            (header[0], header[1]) = (bits, space);
+            for (at, value) in [(12, 3u32), (16, if bits == 24 { 2 } else { 1 }), (20, 300)] {
+                header[at..at + 4].copy_from_slice(&value.to_be_bytes());
+            }
+            stream.extend(header);
+            stream.extend(row);
+            let mut reader = Reader::behind_apple(&stream[APPLE.len()..]).unwrap();
+            let page = reader.next_page().unwrap().unwrap();
+            assert_eq!((page.dpi, page.copies), (300, 1));
+            let (mut all, mut row) = (Vec::new(), Vec::new());
+            for _ in 0..page.height {
+                reader.row(&mut row).unwrap();
+                all.extend_from_slice(&row);
+            }
+            assert!(reader.next_page().unwrap().is_none());
+            pages.push(all);
+        }
+        let line = [10, 20, 30, 10, 20, 30, 255, 255, 255];
+        assert_eq!(pages[0], [line, line].concat());
+        assert_eq!(pages[1], [7, 7, 7, 8, 8, 8, 9, 9, 9]);
+    }
+
+    #[test]
     fn what_is_not_taken_is_named_with_page_and_field() {
         let field = |stream: &[u8]| match rows(stream) {
             Err(RasterError::Field { page: 1, field, .. }) => field,
@@ -272,7 +372,7 @@ mod tests {
         };
         assert_eq!(field(&header(0, 3, 19, 8, 24)), "cupsWidth x cupsHeight");
         assert_eq!(field(&header(u32::MAX, 3, 19, 8, 24)[..]), "cupsWidth x cupsHeight");
-        assert_eq!(field(&header(5, 3, 6, 8, 32)), "cupsColorSpace");
+        assert_eq!(field(&header(5, 3, 6, 8, 24)), "cupsColorSpace");
         let mut other = header(5, 3, 19, 8, 24);
         other[279] = 100;
         assert_eq!(field(&other), "HWResolution");

@@ -8,14 +8,16 @@
 //! tables. `backend` sends the jobs one after the other, keeps them in a journal so that none is printed twice, and reports
 //! the states of printer and job to the print system as `messages`. A queue leads to a `uri`.
 //! Source: the man pages backend(7) and filter(7), and the specifications of PPD and PWG raster files.
+#![forbid(unsafe_code)]
+#![cfg_attr(not(test), warn(clippy::cast_possible_truncation, clippy::cast_sign_loss))]
 
-pub(crate) mod backend;
-pub(crate) mod call;
-pub(crate) mod filter;
+pub mod backend;
+pub mod call;
+pub mod filter;
 pub mod install;
-pub(crate) mod listing;
-pub(crate) mod messages;
-pub(crate) mod options;
+pub mod listing;
+pub mod messages;
+pub mod options;
 pub mod ppd;
-pub(crate) mod raster;
-pub(crate) mod uri;
+pub mod raster;
+pub mod uri;

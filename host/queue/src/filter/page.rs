@@ -1,15 +1,16 @@
 //! From the art of a page to a job: inks as the user chose them, the place on the sheet, passes, bytes.
 
 use std::io::Write;
+use std::path::Path;
 
 use inks::{InkSet, Library};
 use protocol::ink::{Ink, Kind};
 use protocol::paper::{LEFT, Paper};
 
 use super::{FilterError, io_error};
-use crate::queue::options::{Choices, Place, Spots};
-use crate::queue::ppd;
-use art::{Artwork, Window};
+use crate::options::{Choices, Place, Spots};
+use crate::ppd;
+use art::{Artwork, Room, Window};
 use observe::Observer;
 use press::job::Handling;
 use press::layout::{Cut, Layout, Mm, Point, Position};
@@ -72,8 +73,8 @@ impl Press<'_> {
         let choices = self.choices;
         let spots = Ink::ALL.into_iter().filter(|ink| match ink.kind() {
             Kind::Process => choices.colours.contains(*ink),
-            Kind::Foil => choices.foils,
-            _ => true,
+            Kind::Foil => choices.foils && choices.more.inks.contains(*ink),
+            _ => choices.more.inks.contains(*ink),
         });
         art::Settings {
             inks: InkSet::of(spots),
@@ -85,7 +86,7 @@ impl Press<'_> {
             intent: choices.intent,
             gamma: choices.gamma,
             halftone: choices.halftone,
-            ..art::Settings::default()
+            ..choices.more.clone()
         }
     }
 
@@ -99,6 +100,10 @@ impl Press<'_> {
         drawn: Option<Window>,
         mirrored: bool,
     ) -> Option<View> {
+        let pages = &self.choices.pages;
+        if !pages.is_empty() && !pages.iter().any(|range| range.contains(&number)) {
+            return None;
+        }
         let Some(drawn) = drawn else {
             self.observer.note(&format!("page {number} is blank; the page is skipped"));
             return None;
@@ -116,6 +121,25 @@ impl Press<'_> {
                 None
             }
         }
+    }
+
+    /// The job of a picture that has no page of its own: in the middle of the sheet, as large as it says or as fits.
+    pub(super) fn picture(&mut self, path: &Path) -> Result<Vec<u8>, FilterError> {
+        let layout = Layout { cut: true, ..Layout::centred(self.choices.paper) };
+        let (width, length) = layout.largest();
+        let room = Room { width, length, cut: true };
+        let options = art::Options { dpi: None, room, ..self.options(self.choices.dpi) };
+        let art = art::open(&[path.to_path_buf()], &options, self.observer)
+            .map_err(|source| FilterError::Layers { page: 1, source: source.calling_it("this document") })?;
+        let view = View {
+            window: Window { left: 0, top: 0, width: art.width, height: art.length },
+            position: match self.choices.place {
+                Place::At(corner) => Position::FromEdge(corner),
+                Place::Page | Place::Centre => Position::Centred,
+            },
+            beyond: None,
+        };
+        self.job(1, self.choices.paper, &art, &view, self.choices.mirror)
     }
 
     /// The job of a page's art. `mirrored` turns it left to right.

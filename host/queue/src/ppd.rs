@@ -214,7 +214,7 @@ fn custom_papers_into(text: &mut String) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::queue::options::profile_in;
+    use crate::options::profile_in;
 
     #[test]
     fn a_page_of_points_is_the_paper_it_was_declared_as() {

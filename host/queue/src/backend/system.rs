@@ -3,13 +3,13 @@
 //! Waits without limit for the bridge and the operator, unless the queue belongs to a class and another printer may do the job.
 
 use std::cell::{Cell, RefCell};
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use protocol::status;
 
-use crate::queue::messages::{Messages, Reason};
+use crate::messages::{Reason, Report};
 use device::deliver::{Caller, Cartridges, Failure, News, Question};
 use device::forms::PassPlace;
 use device::questions::cartridges::Found;
@@ -23,8 +23,8 @@ const LAST_WORDS: Duration = Duration::from_secs(20);
 const RETRY: Duration = Duration::from_secs(2);
 
 /// The caller of a delivery for a print queue.
-pub(super) struct System<'a, W> {
-    messages: &'a Messages<W>,
+pub(super) struct System<'a> {
+    messages: &'a dyn Report,
     /// Whether the print system wants the job ended, and since when this is known.
     stop: &'a (dyn Fn() -> bool + Sync),
     stopped: Cell<Option<Instant>>,
@@ -47,12 +47,12 @@ struct Position {
     faulty: bool,
 }
 
-impl<'a, W: Write + Send> System<'a, W> {
+impl<'a> System<'a> {
     pub(super) fn new(
-        messages: &'a Messages<W>,
+        messages: &'a dyn Report,
         stop: &'a (dyn Fn() -> bool + Sync),
         in_class: bool,
-    ) -> System<'a, W> {
+    ) -> System<'a> {
         System {
             messages,
             stop,
@@ -163,7 +163,7 @@ impl<'a, W: Write + Send> System<'a, W> {
     }
 }
 
-impl<W: Write + Send> Caller for System<'_, W> {
+impl Caller for System<'_> {
     fn tell(&self, news: &News<'_>) {
         match news {
             News::Printer(cartridges) => self.printer(cartridges),
@@ -228,6 +228,10 @@ impl<W: Write + Send> Caller for System<'_, W> {
         let stopped = self.stopped.get().unwrap_or_else(Instant::now);
         self.stopped.set(Some(stopped));
         if stopped.elapsed() < LAST_WORDS { Wish::Cancel } else { Wish::Leave }
+    }
+
+    fn watches(&self) -> bool {
+        !self.stops()
     }
 
     fn observer(&self) -> &dyn Observer {

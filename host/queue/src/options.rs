@@ -3,8 +3,11 @@
 //! Option strings of the print system are pairs `name=value`, separated by blanks; a value with blanks is quoted or has
 //! backslashes; a bare `name` means true and `noname` false.
 
+use std::ops::RangeInclusive;
+
 use inks::InkSet;
 use protocol::ink::Ink;
+use protocol::paper::Paper;
 use protocol::rgl::Media;
 
 use art::{Finish, GAMMAS, Intent, White};
@@ -94,6 +97,12 @@ pub struct Choices {
     pub custom_paper: bool,
     /// Calibration profile of the queue's printer.
     pub profile: Profile,
+    /// Pages to print, from 1; all if none is named.
+    pub pages: Vec<RangeInclusive<usize>>,
+    /// The sheet, for documents that have none of their own, such as pictures.
+    pub paper: Paper,
+    /// What no dialog shows: how often inks are printed, their order, and the like.
+    pub more: art::Settings,
 }
 
 const INKS: [(&str, &str); 3] = [
@@ -262,6 +271,9 @@ impl Choices {
                 .any(|keyword| asked(keyword).is_some_and(|value| value.eq_ignore_ascii_case("true"))),
             custom_paper: ["PageSize", "media"].into_iter().any(is_custom),
             profile: description.map_or_else(Profile::default, profile_in),
+            pages: Vec::new(),
+            paper: Paper::A4,
+            more: art::Settings { inks: InkSet::of(Ink::ALL), ..art::Settings::default() },
         })
     }
 }

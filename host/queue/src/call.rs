@@ -40,6 +40,8 @@ pub struct Call {
     pub to: Destination,
     /// Folder for data that must outlive the process.
     pub journal: PathBuf,
+    /// Whether to wait for each sheet until the printer says that it is out.
+    pub awaits_sheets: bool,
     /// Whether another printer of a class may do the job.
     pub in_class: bool,
     /// The queue, and the job as the print system lists it there.
@@ -111,6 +113,7 @@ impl Call {
             file,
             to,
             journal: folder.join(if queue.is_empty() { "queue" } else { &queue }),
+            awaits_sheets: false,
             in_class: var("CLASS").is_some_and(|class| !class.is_empty()),
             listed,
             lister: "lpstat".into(),

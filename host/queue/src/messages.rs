@@ -89,6 +89,31 @@ impl Reason {
     }
 }
 
+/// Whoever hears how a delivery goes: a print system, or a print server. As an [`Observer`] it hears notes and progress.
+pub trait Report: Observer {
+    /// Replaces the printer's reasons by these.
+    fn reasons(&self, reasons: &[Reason]);
+    /// Removes these reasons.
+    fn lift(&self, over: &[Reason]);
+    /// Removes all reasons but this one.
+    fn lift_all_but(&self, stays: Reason) {
+        let over: Vec<Reason> = ALL.into_iter().filter(|&reason| reason != stays).collect();
+        self.lift(&over);
+    }
+    /// A message for people.
+    fn info(&self, text: &str);
+    /// Why the job failed or stopped.
+    fn error(&self, text: &str);
+    /// A message for the log only.
+    fn debug(&self, text: &str);
+    /// A sheet is done.
+    fn page(&self, number: usize);
+    /// How much of the sheet is done, in percent.
+    fn percent(&self, share: u64);
+    /// The cartridges the printer has found. It does not know how much ribbon is left.
+    fn cartridges(&self, status: &Status);
+}
+
 struct State<W> {
     out: W,
     reasons: BTreeSet<Reason>,
@@ -103,7 +128,7 @@ pub struct Messages<W> {
     progress: bool,
 }
 
-impl<W: Write> Messages<W> {
+impl<W: Write + Send> Messages<W> {
     /// Begins by removing every reason that an earlier process may have left.
     pub fn new(out: W) -> Messages<W> {
         let state = State { out, reasons: ALL.into(), stage: (String::new(), 0, 0), share: None };
@@ -132,9 +157,10 @@ impl<W: Write> Messages<W> {
             let _ = state.out.write_all(line.as_bytes());
         });
     }
+}
 
-    /// Replaces the printer's reasons by these.
-    pub fn reasons(&self, reasons: &[Reason]) {
+impl<W: Write + Send> Report for Messages<W> {
+    fn reasons(&self, reasons: &[Reason]) {
         let wanted: BTreeSet<Reason> = reasons.iter().copied().collect();
         let before = self.with(|state| std::mem::replace(&mut state.reasons, wanted.clone()));
         for (sign, changed) in [("-", &before - &wanted), ("+", &wanted - &before)] {
@@ -145,49 +171,36 @@ impl<W: Write> Messages<W> {
         }
     }
 
-    /// Removes these reasons.
-    pub fn lift(&self, over: &[Reason]) {
+    fn lift(&self, over: &[Reason]) {
         let left: Vec<Reason> =
             self.with(|state| state.reasons.iter().copied().filter(|r| !over.contains(r)).collect());
         self.reasons(&left);
     }
 
-    /// Removes all reasons but this one.
-    pub fn lift_all_but(&self, stays: Reason) {
-        let over: Vec<Reason> = ALL.into_iter().filter(|&reason| reason != stays).collect();
-        self.lift(&over);
-    }
-
-    /// A message for people.
-    pub fn info(&self, text: &str) {
+    fn info(&self, text: &str) {
         self.line("INFO", text);
     }
 
-    /// Why the job failed or stopped.
-    pub fn error(&self, text: &str) {
+    fn error(&self, text: &str) {
         self.line("ERROR", text);
     }
 
-    /// A message for the log only.
-    pub fn debug(&self, text: &str) {
+    fn debug(&self, text: &str) {
         self.line("DEBUG", text);
     }
 
-    /// A sheet is done.
-    pub fn page(&self, number: usize) {
+    fn page(&self, number: usize) {
         self.line("PAGE", &format!("{number} 1"));
     }
 
-    /// How much of the job is done, in percent.
-    pub fn percent(&self, share: u64) {
+    fn percent(&self, share: u64) {
         let new = self.with(|state| state.share.replace(share) != Some(share));
         if new {
             self.line("ATTR", &format!("job-media-progress={share}"));
         }
     }
 
-    /// The cartridges the printer has found. It does not know how much ribbon is left, so no amount is reported.
-    pub fn cartridges(&self, status: &Status) {
+    fn cartridges(&self, status: &Status) {
         if status.stale || status.cartridges.is_empty() {
             return;
         }
@@ -212,7 +225,7 @@ impl<W: Write> Messages<W> {
 }
 
 /// The colour of a ribbon in a print dialog.
-fn colour(ink: Ink) -> &'static str {
+pub fn colour(ink: Ink) -> &'static str {
     match ink {
         Ink::Black => "#000000",
         Ink::Cyan => "#00FFFF",

@@ -7,30 +7,33 @@
 //! sheet whose outcome is unknown, and a printer that has to be reset, hold the job: nobody can be asked here. Whoever releases
 //! a held job agrees to the reset and to printing the sheet again. SIGTERM ends the sheet at the bridge.
 //! What an earlier job has left open at the bridge is ended first.
-//! The backend ends when the last sheet is *sent*: while the printer prints from its own memory the next job may come.
+//! For the print system the backend ends when the last sheet is *sent*: while the printer prints from its own memory the next job
+//! may come. A server of its own waits until each sheet is out.
 //! Limits: jobs of up to 1 GB. A raw device tells nothing, so a job that was interrupted there is held.
 //! Source: backend(7).
 
 mod system;
 
+use std::borrow::Cow;
 use std::fs::{self, File};
-use std::io::{self, Read, Write};
+use std::io::{self, Read};
 use std::ops::Range;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use super::call::{Call, Exit};
-use super::messages::Messages;
-use super::uri;
+use super::messages::{Reason, Report};
 use art::process::Process;
 use device::connection::{Address, Destination};
 use device::deliver::{Delivery, Ended, Failure, Job, Packed};
 use device::forms::{self, Checked, Content};
 use device::printers::{Printer, Printers};
+use device::transit::finish::Sheet;
 use device::transit::journal::{Entry, Journal, OpenJob};
 use device::transit::raw::RawError;
 use device::transit::session::{Outcome, Phase, SessionError};
+use files::durable::{self, Access};
 use observe::Silent;
 use press::inspect::sheets;
 use system::System;
@@ -49,56 +52,159 @@ const LONGEST_LIST: u64 = 1 << 20;
 struct Stopped(Exit);
 
 /// A job on its way.
-struct Backend<'a, W> {
+struct Backend<'a> {
     call: &'a Call,
-    messages: &'a Messages<W>,
-    system: &'a System<'a, W>,
+    messages: &'a dyn Report,
+    system: &'a System<'a>,
     delivery: &'a Delivery<'a>,
+    given_up: &'a dyn Fn() -> bool,
 }
 
-/// Prints a job. `input` is standard input; `stop` says whether the print system has asked to end.
-pub fn run<W: Write + Send>(
-    call: &Call,
-    printers: &Printers,
-    input: &mut dyn Read,
-    messages: &Messages<W>,
-    stop: &(dyn Fn() -> bool + Sync),
-) -> Exit {
-    let system = System::new(messages, stop, call.in_class);
-    let delivery = Delivery::new(printers, &system);
-    match (Backend { call, messages, system: &system, delivery: &delivery }).deliver(input) {
-        Ok(()) => {
-            messages.reasons(&[]);
-            Exit::Ok
-        }
-        Err(Stopped(exit)) => exit,
+/// The sheets of a job, each one whole job in the printer's language.
+pub trait Sheets {
+    /// How many there are.
+    fn count(&self) -> usize;
+
+    /// The bytes of one, from 0.
+    ///
+    /// # Errors
+    /// What the system says.
+    fn sheet(&self, index: usize) -> io::Result<Cow<'_, [u8]>>;
+}
+
+/// Sheets behind each other.
+struct Row {
+    bytes: Vec<u8>,
+    places: Vec<Range<usize>>,
+}
+
+impl Sheets for Row {
+    fn count(&self) -> usize {
+        self.places.len()
+    }
+
+    fn sheet(&self, index: usize) -> io::Result<Cow<'_, [u8]>> {
+        Ok(Cow::Borrowed(&self.bytes[self.places[index].clone()]))
     }
 }
 
-impl<W: Write + Send> Backend<'_, W> {
+/// Prints a job of the print system. `input` is standard input; `stop` says whether the print system has asked to end.
+pub fn run(
+    call: &Call,
+    printers: &Printers,
+    input: &mut dyn Read,
+    messages: &dyn Report,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Exit {
+    let bytes = match read(call, input) {
+        // A filter that made nothing has said why, and the print system shows the last error.
+        Ok(job) if job.is_empty() && !stop() => {
+            messages.debug("there is nothing to print: the job has no bytes");
+            return Exit::Cancel;
+        }
+        Ok(job) if job.len() as u64 > LARGEST => {
+            messages.error("the job is larger than 1 GB; print fewer pages at once");
+            return Exit::Cancel;
+        }
+        Ok(job) => job,
+        Err(error) => {
+            messages.error(&format!("cannot read the job: {error}"));
+            return Exit::Failed;
+        }
+    };
+    let places = sheets(&bytes);
+    let (exit, whole) =
+        deliver(call, printers, &Row { bytes, places }, messages, stop, &|| is_given_up(call));
+    if whole {
+        // Sent whole: should somebody want it again, it is another print.
+        forget(call, messages);
+    }
+    exit
+}
+
+/// Forgets what is known of a job whose end is on record elsewhere.
+pub fn forget(call: &Call, messages: &dyn Report) {
+    forget_folder(&call.journal.join(&call.identity), messages);
+}
+
+fn forget_folder(folder: &Path, messages: &dyn Report) {
+    if let Err(error) = fs::remove_dir_all(folder)
+        && error.kind() != io::ErrorKind::NotFound
+    {
+        // The sheets are sent all the same; that they stay on record costs a reprint of this very job.
+        messages.debug(&format!("cannot remove {}: {error}", folder.display()));
+    }
+}
+
+/// Prints sheets, one after the other; says whether all of them were sent. What is known of them stays until [`forget`], so that
+/// it outlives whoever keeps the job. `given_up` says whether a job that was stopped is not to go on later.
+pub fn deliver(
+    call: &Call,
+    printers: &Printers,
+    sheets: &dyn Sheets,
+    messages: &dyn Report,
+    stop: &(dyn Fn() -> bool + Sync),
+    given_up: &dyn Fn() -> bool,
+) -> (Exit, bool) {
+    let system = System::new(messages, stop, call.in_class);
+    let delivery = Delivery::new(printers, &system);
+    match (Backend { call, messages, system: &system, delivery: &delivery, given_up }).deliver(sheets) {
+        Ok(whole) => {
+            messages.reasons(&[]);
+            (Exit::Ok, whole)
+        }
+        Err(Stopped(exit)) => (exit, false),
+    }
+}
+
+fn read(call: &Call, input: &mut dyn Read) -> io::Result<Vec<u8>> {
+    let mut job = Vec::new();
+    match &call.file {
+        Some(path) => File::open(path)?.take(LARGEST + 1).read_to_end(&mut job)?,
+        None => input.take(LARGEST + 1).read_to_end(&mut job)?,
+    };
+    Ok(job)
+}
+
+/// Whether the print system has given the job up for good: it lists its jobs, but not this one. When it ends itself, it
+/// stops jobs in the same way, but then it lists none.
+fn is_given_up(call: &Call) -> bool {
+    let (queue, job) = &call.listed;
+    let mut command = Command::new(&call.lister);
+    command.args(["-W", "not-completed", "-o", queue]).stdout(Stdio::piped());
+    let Ok(mut process) = Process::start(&mut command, ANSWER) else { return false };
+    let mut list = String::new();
+    let read = process.output().map(|output| output.take(LONGEST_LIST).read_to_string(&mut list));
+    matches!(read, Some(Ok(_)))
+        && process.end(|| false).is_ok()
+        && !list.lines().any(|line| line.split_whitespace().next() == Some(job))
+}
+
+impl Backend<'_> {
     fn fail(&self, exit: Exit, error: &dyn std::fmt::Display) -> Stopped {
         self.messages.error(&error.to_string());
         Stopped(exit)
     }
 
-    fn deliver(&self, input: &mut dyn Read) -> Result<(), Stopped> {
-        let job = self.read(input)?;
+    fn bytes<'s>(&self, sheets: &'s dyn Sheets, index: usize) -> Result<Cow<'s, [u8]>, Stopped> {
+        sheets
+            .sheet(index)
+            .map_err(|error| self.fail(Exit::Failed, &format!("cannot read sheet {}: {error}", index + 1)))
+    }
+
+    fn deliver(&self, sheets: &dyn Sheets) -> Result<bool, Stopped> {
         if self.system.stops() {
-            return Ok(());
+            return Ok(false);
         }
-        let places = sheets(&job);
         // All are judged before the first byte leaves.
-        let checked: Vec<Checked> = (1..)
-            .zip(&places)
-            .map(|(number, place)| {
-                forms::check(&job[place.clone()], &Silent).map_err(|error| {
-                    self.fail(
-                        Exit::Cancel,
-                        &format!("sheet {number} of {}: {}", places.len(), observe::with_causes(&error)),
-                    )
-                })
-            })
-            .collect::<Result<_, _>>()?;
+        let mut checked = Vec::new();
+        for index in 0..sheets.count() {
+            checked.push(forms::check(&self.bytes(sheets, index)?, &Silent).map_err(|error| {
+                let text =
+                    format!("sheet {} of {}: {}", index + 1, sheets.count(), observe::with_causes(&error));
+                self.fail(Exit::Cancel, &text)
+            })?);
+        }
         if checked.iter().any(|sheet| sheet.dialect.is_some()) {
             self.messages.info("the job is in another driver's dialect; it is sent unchanged");
         }
@@ -108,62 +214,35 @@ impl<W: Write + Send> Backend<'_, W> {
         }
         let mut number = 0;
         for _ in 0..self.call.copies {
-            for (place, checked) in places.iter().zip(&checked) {
+            for (index, checked) in checked.iter().enumerate() {
                 number += 1;
                 let own = folder.join(format!("{number:04}"));
-                if self.system.stops() || !self.sheet(&job, place, checked, &own)? {
+                let sent =
+                    !self.system.stops() && self.sheet(&self.bytes(sheets, index)?, checked, &own, number)?;
+                if !sent {
                     // Of a job without a printed sheet there is nothing to remember: if it is started again, it begins anew.
                     // One that was only stopped goes on after its printed sheets.
-                    if self.has_ended(&own) && (number == 1 || self.is_given_up()) {
-                        self.forget(&folder);
+                    if self.has_ended(&own) && (number == 1 || (self.given_up)()) {
+                        forget_folder(&folder, self.messages);
                     }
-                    return Ok(());
+                    return Ok(false);
                 }
                 self.messages.page(number);
             }
         }
-        // Sent whole: should somebody want it again, it is another print.
-        self.forget(&folder);
-        Ok(())
-    }
-
-    fn read(&self, input: &mut dyn Read) -> Result<Vec<u8>, Stopped> {
-        let mut job = Vec::new();
-        let read = match &self.call.file {
-            Some(path) => File::open(path).and_then(|file| file.take(LARGEST + 1).read_to_end(&mut job)),
-            None => input.take(LARGEST + 1).read_to_end(&mut job),
-        };
-        match read {
-            // A filter that made nothing has said why, and the print system shows the last error.
-            Ok(_) if job.is_empty() && !self.system.stops() => {
-                self.messages.debug("there is nothing to print: the job has no bytes");
-                Err(Stopped(Exit::Cancel))
-            }
-            Ok(_) if job.len() as u64 > LARGEST => {
-                Err(self.fail(Exit::Cancel, &"the job is larger than 1 GB; print fewer pages at once"))
-            }
-            Ok(_) => Ok(job),
-            Err(error) => Err(self.fail(Exit::Failed, &format!("cannot read the job: {error}"))),
-        }
+        Ok(true)
     }
 
     /// Sends one sheet, unless it is sent already. False when it was ended early.
-    fn sheet(
-        &self,
-        job: &[u8],
-        place: &Range<usize>,
-        checked: &Checked,
-        folder: &Path,
-    ) -> Result<bool, Stopped> {
-        let content = Content::Bytes(&job[place.clone()]);
+    fn sheet(&self, bytes: &[u8], checked: &Checked, folder: &Path, number: usize) -> Result<bool, Stopped> {
+        let content = Content::Bytes(bytes);
         let job = Job { name: &self.call.title, content, checked };
         // Whoever releases a job that was held agrees to what it was held for.
         self.system.released(fs::remove_file(folder.join(HELD)).is_ok());
         match &self.call.to {
             Destination::Bridge(address) => self.to_bridge(job, address, folder),
             Destination::Raw(device) => self.to_device(job, device, folder),
-            // A URI never leads to a file.
-            Destination::File(_) => Err(self.fail(Exit::Stop, &uri::UriError::File)),
+            Destination::File(to) => self.to_file(bytes, to, number),
         }
     }
 
@@ -185,10 +264,45 @@ impl<W: Write + Send> Backend<'_, W> {
         }
         .and_then(|queued: OpenJob| self.delivery.send(&journal, queued, address, None, false));
         match sent {
-            Ok(ended) => self.judge(&ended, folder),
+            Ok(ended) => {
+                let sent = self.judge(&ended, folder)?;
+                if sent && self.call.awaits_sheets {
+                    self.await_sheet(ended.entry.record.job, address);
+                }
+                Ok(sent)
+            }
             Err(Failure::Left) => Ok(false),
             Err(_) if self.system.stops() => Ok(false),
             Err(failure) => Err(failed(failure)),
+        }
+    }
+
+    /// Keeps a sheet as a file in a folder. Its name says which it is, so a sheet that is there is not written again.
+    fn to_file(&self, bytes: &[u8], to: &Path, number: usize) -> Result<bool, Stopped> {
+        let path = to.join(format!("{}-{number:04}.rgl", self.call.identity));
+        let kept = || {
+            durable::make_folder(to, Access::Everyone)?;
+            if path.exists() { Ok(()) } else { durable::write(&path, bytes, Access::Private) }
+        };
+        match kept() {
+            Ok(()) => Ok(true),
+            Err(error) => Err(self.fail(Exit::Stop, &format!("cannot write {}: {error}", path.display()))),
+        }
+    }
+
+    /// Waits until the printer says that the sheet is out, and tells what it complains of meanwhile.
+    fn await_sheet(&self, job: u32, address: &Address) {
+        self.messages.info("sent; the printer prints the sheet");
+        let mut watch = |troubles: &[String]| match troubles {
+            [] => self.messages.reasons(&[]),
+            troubles => {
+                self.messages.reasons(&[Reason::Other]);
+                self.messages.info(&troubles.join("; "));
+            }
+        };
+        match self.delivery.await_sheet(job, address, &mut watch) {
+            Sheet::Out => self.messages.info("the sheet is out"),
+            Sheet::Unknown(why) => self.messages.info(&format!("sent; {why}")),
         }
     }
 
@@ -297,7 +411,7 @@ impl<W: Write + Send> Backend<'_, W> {
             let age =
                 fs::metadata(&job).and_then(|data| data.modified()).ok().and_then(|time| time.elapsed().ok());
             if !open && age.is_some_and(|age| age > FORGET) {
-                self.forget(&job);
+                forget_folder(&job, self.messages);
             }
         }
         Ok(())
@@ -336,29 +450,6 @@ impl<W: Write + Send> Backend<'_, W> {
         !folder.join("begun").exists()
             && (!folder.exists() || Journal::at(folder).ok().and_then(ended).unwrap_or(false))
     }
-
-    /// Whether the print system has given the job up for good: it lists its jobs, but not this one. When it ends itself, it
-    /// stops jobs in the same way, but then it lists none.
-    fn is_given_up(&self) -> bool {
-        let (queue, job) = &self.call.listed;
-        let mut command = Command::new(&self.call.lister);
-        command.args(["-W", "not-completed", "-o", queue]).stdout(Stdio::piped());
-        let Ok(mut process) = Process::start(&mut command, ANSWER) else { return false };
-        let mut list = String::new();
-        let read = process.output().map(|output| output.take(LONGEST_LIST).read_to_string(&mut list));
-        matches!(read, Some(Ok(_)))
-            && process.end(|| false).is_ok()
-            && !list.lines().any(|line| line.split_whitespace().next() == Some(job))
-    }
-
-    fn forget(&self, folder: &Path) {
-        if let Err(error) = fs::remove_dir_all(folder)
-            && error.kind() != io::ErrorKind::NotFound
-        {
-            // The sheets are sent all the same; that they stay on record costs a reprint of this very job.
-            self.messages.debug(&format!("cannot remove {}: {error}", folder.display()));
-        }
-    }
 }
 
 /// Name of the file in a sheet's folder that says that its job was held.
@@ -371,6 +462,7 @@ const SWITCH: &str = "switch the printer off and on, then release the job to pri
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::messages::Messages;
     use press::inspect::inspect;
     use press::job::stream::write_job;
     use press::separate::Pass;
@@ -412,6 +504,7 @@ mod tests {
                 to: Destination::Raw(device),
                 journal: folder.path().join("jobs"),
                 in_class: false,
+                awaits_sheets: false,
                 listed: ("queue".into(), "queue-7".into()),
                 lister: folder.path().join("lister"),
             };

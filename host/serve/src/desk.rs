@@ -1,0 +1,314 @@
+//! The desk: a page for people, and what it asks for.
+//!
+//! Method: the page is three files in the program, and asks for one description of everything every two seconds. A document that is
+//! dropped on it becomes a held job; its sheets are drawn, and what the simulated printer makes of the first one is shown with its
+//! passes. Printing releases the job, whose sheets are there already.
+//! Cost: a preview is a picture of a sheet, dot for dot, made once. Limits: no file of another machine, so it works without internet.
+//! Source: what owners like of LPrint and PAPPL: the loaded sheet is set here, for dialogs can only read it.
+
+use std::fs;
+
+use bytes::Bytes;
+use http_body_util::Full;
+use hyper::body::Incoming;
+use hyper::{Response, StatusCode};
+use observe::{Silent, with_causes};
+use serde_json::{Value, json};
+
+use crate::http::{Gone, Limits, keep, plain, words};
+use crate::jobs::{Job, State};
+use crate::operations;
+use crate::server::{ChangeError, Data, Loaded, Server};
+use crate::spool::Packing;
+use crate::template::{AUTO, SHEETS, TYPES, Ticket, keyword_of, size_of};
+use crate::worker;
+use device::forms;
+use device::ledger::{Ledger, totals};
+use press::preview::inks::{Ground, save_sheet};
+use press::simulate::{Setup, print};
+use protocol::ink::Ink;
+
+/// Who asks.
+pub struct Guest {
+    /// Whether they may change what is not theirs.
+    pub may_change: bool,
+}
+
+/// Answers whoever looks.
+pub fn get(server: &Server, path: &str, query: &str) -> Response<Full<Bytes>> {
+    match path {
+        "/" => plain(StatusCode::OK, "text/html; charset=utf-8", &include_bytes!("desk/desk.html")[..]),
+        "/desk.js" => {
+            plain(StatusCode::OK, "text/javascript; charset=utf-8", &include_bytes!("desk/desk.js")[..])
+        }
+        "/desk.css" => plain(StatusCode::OK, "text/css; charset=utf-8", &include_bytes!("desk/desk.css")[..]),
+        "/icon.png" => plain(StatusCode::OK, "image/png", icon()),
+        "/desk.json" => {
+            let about = describe(server);
+            plain(StatusCode::OK, "application/json", about.to_string())
+        }
+        "/desk/preview.png" => {
+            let job = number(query, "job").unwrap_or(0);
+            match fs::read(server.store.folder(job).join(PREVIEW)) {
+                Ok(picture) => plain(StatusCode::OK, "image/png", picture),
+                Err(_) => words(StatusCode::NOT_FOUND, "there is no preview of this job"),
+            }
+        }
+        _ => words(StatusCode::NOT_FOUND, "there is no such page"),
+    }
+}
+
+/// The preview in a job's folder.
+const PREVIEW: &str = "preview.png";
+
+/// Does what is asked.
+pub async fn post(
+    server: &Server,
+    path: &str,
+    query: &str,
+    guest: &Guest,
+    mut body: Incoming,
+    limits: &Limits,
+) -> Response<Full<Bytes>> {
+    let job = number(query, "job");
+    let done = match (path, guest.may_change) {
+        ("/desk/print", _) => return upload(server, query, &mut body, limits).await,
+        ("/desk/plan", _) => {
+            return tokio::task::block_in_place(|| match plan(server, job.unwrap_or(0)) {
+                Ok(plan) => plain(StatusCode::OK, "application/json", plan.to_string()),
+                Err(why) => words(StatusCode::UNPROCESSABLE_ENTITY, &why),
+            });
+        }
+        ("/desk/cancel" | "/desk/hold" | "/desk/release" | "/desk/load" | "/desk/identify", false) => {
+            // Whoever guesses is slow.
+            tokio::time::sleep(std::time::Duration::from_secs(1)).await;
+            return words(
+                StatusCode::UNAUTHORIZED,
+                "type the code that `foilpress serve` shows in its terminal",
+            );
+        }
+        ("/desk/load", true) => tokio::task::block_in_place(|| {
+            let size = parameter(query, "size").as_deref().and_then(size_of).ok_or(ChangeError::Sheet)?;
+            server.load(Loaded { size, kind: parameter(query, "kind").unwrap_or_else(|| AUTO.into()) })
+        }),
+        (path, true) => tokio::task::block_in_place(|| {
+            let id = job.ok_or(ChangeError::NoJob)?;
+            match path {
+                "/desk/cancel" => server.cancel(id),
+                "/desk/hold" => server.hold(id),
+                "/desk/release" => server.release(id),
+                _ => Err(ChangeError::NoJob),
+            }
+        }),
+        (_, false) => return words(StatusCode::NOT_FOUND, "there is no such thing to do"),
+    };
+    match done {
+        Ok(()) => words(StatusCode::OK, "done"),
+        Err(error) => words(StatusCode::CONFLICT, &with_causes(&error)),
+    }
+}
+
+/// A document from the page: a job that is held until somebody has seen its plan.
+async fn upload(server: &Server, query: &str, body: &mut Incoming, limits: &Limits) -> Response<Full<Bytes>> {
+    let Some(printer) = server.printer(&parameter(query, "printer").unwrap_or_default()) else {
+        return words(StatusCode::NOT_FOUND, "there is no such printer");
+    };
+    let name = parameter(query, "name").unwrap_or_else(|| "Untitled".into());
+    let ticket = tokio::task::block_in_place(|| {
+        let loaded = server.data().loaded().clone();
+        let kind = Some(loaded.kind).filter(|kind| kind != AUTO);
+        Ticket { size: Some(loaded.size), kind, held: true, ..Ticket::default() }
+    });
+    let id = match tokio::task::block_in_place(|| server.create(printer, &name, "desk", ticket)) {
+        Ok(id) => id,
+        Err(error) => return words(StatusCode::SERVICE_UNAVAILABLE, &with_causes(&error)),
+    };
+    let Ok(kept) = keep(body, &[], &server.store.folder(id), Packing::None, limits).await else {
+        tokio::task::block_in_place(|| server.forget(id));
+        let Gone = Gone;
+        return words(StatusCode::REQUEST_TIMEOUT, "the document did not come in time");
+    };
+    tokio::task::block_in_place(|| {
+        let arrived = match kept {
+            Ok((path, kind, octets)) => operations::keep_document(server, id, &path, kind, octets)
+                .and_then(|()| server.arrived(id))
+                .map_err(|error| with_causes(&error)),
+            Err(error) => Err(with_causes(&error)),
+        };
+        match arrived {
+            Ok(()) => plain(StatusCode::OK, "application/json", json!({ "job": id }).to_string()),
+            Err(why) => {
+                server.forget(id);
+                words(StatusCode::UNPROCESSABLE_ENTITY, &why)
+            }
+        }
+    })
+}
+
+/// What a held job would print: its passes and the ribbon they take, and a preview of its first sheet.
+fn plan(server: &Server, id: u32) -> Result<Value, String> {
+    worker::prepare(server, id)?;
+    let sheets = worker::Folder::of(&server.store.sheets(id));
+    let bytes = queue::backend::Sheets::sheet(&sheets, 0).map_err(|error| error.to_string())?;
+    let checked = forms::check(&bytes, &Silent).map_err(|error| with_causes(&error))?;
+    let printout = print(&bytes, &Setup::default(), &Silent).map_err(|error| with_causes(&error))?;
+    let printed = printout.sheet().map_err(|error| with_causes(&error))?;
+    let area = sheet::Area { left: 0, top: 0, width: printed.width(), length: printed.length() };
+    let path = server.store.folder(id).join(PREVIEW);
+    save_sheet(&printed, area, 1, Ground::default(), &path).map_err(|error| with_causes(&error))?;
+    let passes: Vec<Value> = checked
+        .passes
+        .iter()
+        .zip(&checked.ribbon_mm)
+        .zip(&printout.passes)
+        .map(|((_, ribbon_mm), pass)| {
+            json!({ "ink": pass.ink.name(), "dots": pass.plane.dots(), "ribbon_mm": ribbon_mm.round() })
+        })
+        .collect();
+    let (message, total) = {
+        let data = server.data();
+        let job = data.jobs.get(&id).ok_or("there is no such job")?;
+        (job.message.clone(), job.sheets)
+    };
+    Ok(json!({ "job": id, "sheets": total, "passes": passes, "note": message }))
+}
+
+/// The value of a parameter in an address, without control characters.
+fn parameter(query: &str, name: &str) -> Option<String> {
+    let value = query.split('&').find_map(|pair| pair.strip_prefix(name)?.strip_prefix('='))?;
+    let mut bytes = Vec::new();
+    let mut rest = value.bytes();
+    while let Some(byte) = rest.next() {
+        let digit =
+            |byte: Option<u8>| char::from(byte?).to_digit(16).and_then(|digit| u8::try_from(digit).ok());
+        bytes.push(match byte {
+            b'+' => b' ',
+            b'%' => digit(rest.next())? << 4 | digit(rest.next())?,
+            byte => byte,
+        });
+    }
+    let text: String = String::from_utf8(bytes).ok()?.chars().filter(|c| !c.is_control()).take(200).collect();
+    Some(text)
+}
+
+fn number(query: &str, name: &str) -> Option<u32> {
+    parameter(query, name)?.parse().ok()
+}
+
+/// Everything that the page shows.
+fn describe(server: &Server) -> Value {
+    let data = server.data();
+    let printers: Vec<Value> = server
+        .settings
+        .printers
+        .iter()
+        .map(|printer| json!({ "name": printer.name, "about": printer.about }))
+        .collect();
+    let sizes: Vec<Value> =
+        SHEETS.iter().map(|(keyword, paper)| json!({ "keyword": keyword, "label": paper.name() })).collect();
+    let types: Vec<Value> = std::iter::once((AUTO, "As the preset says"))
+        .chain(TYPES.iter().map(|row| (row.0, row.1)))
+        .map(|(keyword, label)| json!({ "keyword": keyword, "label": label }))
+        .collect();
+    let jobs: Vec<Value> = data.jobs.values().rev().take(50).map(|job| about(&data, job)).collect();
+    let ribbons = Ledger::of(&server.settings.devices).lines().map_or_else(
+        |_| Vec::new(),
+        |(lines, _)| {
+            let total = |total: device::ledger::Total| json!({ "ink": total.ink, "used_mm": total.ribbon_mm.round() });
+            totals(&lines, |_| None).into_iter().map(total).collect::<Vec<Value>>()
+        },
+    );
+    let loaded = data.loaded();
+    let wanted = data.reasons.contains(&queue::messages::Reason::SupplyMissing);
+    json!({
+        "printers": printers,
+        "sizes": sizes,
+        "types": types,
+        "loaded": { "size": keyword_of(loaded.size), "kind": loaded.kind },
+        "state": {
+            "message": data.message,
+            "reasons": data.reasons.iter().map(|reason| reason.keyword()).collect::<Vec<_>>(),
+            "percent": data.percent,
+            "prints": data.current().map(|job| job.id),
+            "wants_cartridge": wanted,
+        },
+        "cartridges": data.cartridges,
+        "inks": Ink::ALL.map(|ink| json!({ "name": ink.name(), "colour": queue::messages::colour(ink) })),
+        "ribbons": ribbons,
+        "jobs": jobs,
+        "identify": data.identify,
+    })
+}
+
+fn about(data: &Data, job: &Job) -> Value {
+    let (state, _) = operations::state(data, job);
+    let words = match state {
+        3 => "waits",
+        4 if job.state == State::Incoming => "arrives",
+        4 => "held",
+        5 if job.sheets.is_none() => "is drawn",
+        5 => "prints",
+        6 => "stopped",
+        7 => "cancelled",
+        8 => "failed",
+        _ => "printed",
+    };
+    json!({
+        "id": job.id,
+        "name": job.name,
+        "user": job.user,
+        "printer": job.printer,
+        "state": words,
+        "over": job.state.is_over(),
+        "held": job.state == State::Held,
+        "message": job.message,
+        "sheets": job.sheets,
+        "done": job.done,
+    })
+}
+
+/// A sheet with a leaf of foil on it, 128 x 128 pixels.
+fn icon() -> Vec<u8> {
+    const SIDE: u32 = 128;
+    let picture = image::RgbImage::from_fn(SIDE, SIDE, |x, y| {
+        let (dx, dy) = (f64::from(x) - 64.0, f64::from(y) - 70.0);
+        let leaf = dx.abs() < 26.0 * (1.0 - (dy / 40.0).powi(2)).max(0.0);
+        match (12..116).contains(&x) && (6..122).contains(&y) {
+            true if leaf && dx.abs() > 1.5 => image::Rgb([225, 160, 0]),
+            true => image::Rgb([250, 250, 246]),
+            false => image::Rgb([40, 60, 90]),
+        }
+    });
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    // Into memory nothing fails.
+    let _ = picture.write_to(&mut bytes, image::ImageFormat::Png);
+    bytes.into_inner()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn parameters_are_read_as_browsers_write_them() {
+        let query = "printer=decal&name=Blatt%20%C3%A4%0A.pdf&job=7";
+        assert_eq!(parameter(query, "printer").as_deref(), Some("decal"));
+        assert_eq!(parameter(query, "name").as_deref(), Some("Blatt ä.pdf"));
+        assert_eq!(number(query, "job"), Some(7));
+        assert_eq!((parameter(query, "size"), parameter("name=%zz", "name")), (None, None));
+    }
+
+    #[test]
+    fn the_icon_is_a_picture() {
+        let picture = image::load_from_memory(&icon()).unwrap();
+        assert_eq!((picture.width(), picture.height()), (128, 128));
+    }
+
+    proptest! {
+        #[test]
+        fn any_query_is_read(query in ".{0,80}") {
+            parameter(&query, "name");
+        }
+    }
+}

@@ -1,0 +1,287 @@
+//! Jobs: what is known of them, and what stays known when the process is gone.
+//!
+//! Problem: a job that was accepted must be printed, once, whatever happens to the server meanwhile. Method: a folder for each job, with
+//! its record and its document; a change of the record is on disk before anybody is told of it ([`durable`]). A job that was on its way
+//! when the process ended is pending again: what of it is printed the delivery's own journal knows, so it goes on behind that.
+//! The order at the end of a job is: its end on record, then the journal's records of its sheets removed, then its document. So there is
+//! no step after which a restart would print it again.
+//! Cost: two syncs for each change of a job's state. Limits: the records of the last hundred ended jobs stay.
+//! Source: RFC 8011, section 5.3.7, for the states.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use files::durable::{self, Access};
+use serde::{Deserialize, Serialize};
+
+use crate::template::Ticket;
+
+/// Ended jobs whose records stay.
+const KEPT: usize = 100;
+/// A record is far smaller.
+const LARGEST_RECORD: u64 = 1 << 20;
+
+/// Where a job stands.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum State {
+    /// Its document is not here yet.
+    Incoming,
+    /// It waits for its turn.
+    Pending,
+    /// It waits until it is released.
+    Held,
+    /// It is drawn, sent or printed.
+    Processing,
+    /// Ended by somebody.
+    Canceled,
+    /// Ended because it cannot be printed.
+    Aborted,
+    /// Its last sheet is out.
+    Completed,
+}
+
+impl State {
+    /// Whether it is over.
+    pub fn is_over(self) -> bool {
+        matches!(self, State::Canceled | State::Aborted | State::Completed)
+    }
+}
+
+/// A job.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct Job {
+    /// Its number.
+    pub id: u32,
+    /// The printer it was given to.
+    pub printer: String,
+    /// What its owner calls it.
+    pub name: String,
+    /// Its owner.
+    pub user: String,
+    /// What it asks for.
+    pub ticket: Ticket,
+    /// The name of its document's file; none until that is here.
+    pub document: Option<String>,
+    /// The type of its document.
+    pub format: String,
+    /// The document's bytes.
+    pub octets: u64,
+    /// Where it stands.
+    pub state: State,
+    /// Whether somebody wants it ended.
+    pub cancel: bool,
+    /// What there is to know, for people.
+    pub message: String,
+    /// When it came, in seconds since 1970.
+    pub created: u64,
+    /// When its drawing began.
+    pub begun: Option<u64>,
+    /// When it ended.
+    pub ended: Option<u64>,
+    /// Its sheets, copies included, once they are drawn.
+    pub sheets: Option<u32>,
+    /// Sheets that are printed.
+    pub done: u32,
+}
+
+impl Job {
+    /// The name under which the delivery knows it: no other job's, on any server.
+    pub fn identity(&self) -> String {
+        format!("serve-{:06}-{:x}", self.id, self.created)
+    }
+}
+
+/// Why jobs cannot be kept.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot {what} {}", path.display())]
+pub struct StoreError {
+    what: &'static str,
+    path: PathBuf,
+    #[source]
+    source: io::Error,
+}
+
+fn failed(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> StoreError {
+    let path = path.to_path_buf();
+    move |source| StoreError { what, path, source }
+}
+
+/// The jobs on disk.
+pub struct Store {
+    folder: PathBuf,
+}
+
+impl Store {
+    /// Those in this folder, which is made if need be, with the records of those that can be read.
+    ///
+    /// # Errors
+    /// The folder cannot be made or read.
+    pub fn open(folder: &Path) -> Result<(Store, BTreeMap<u32, Job>), StoreError> {
+        durable::make_folder(folder, Access::Private).map_err(failed("make", folder))?;
+        let store = Store { folder: folder.to_path_buf() };
+        let mut jobs = BTreeMap::new();
+        for entry in fs::read_dir(folder).map_err(failed("read", folder))? {
+            let path = entry.map_err(failed("read", folder))?.path();
+            let number = path.file_name().and_then(|name| name.to_str()?.parse::<u32>().ok());
+            let Some(number) = number else { continue };
+            match read(&path) {
+                Some(job) if job.id == number => {
+                    jobs.insert(number, job);
+                }
+                // Its owner was never told that it is here.
+                _ => store.clear(number, true)?,
+            }
+        }
+        Ok((store, jobs))
+    }
+
+    /// The folder of a job.
+    pub fn folder(&self, id: u32) -> PathBuf {
+        self.folder.join(id.to_string())
+    }
+
+    /// The folder of a job's drawn sheets.
+    pub fn sheets(&self, id: u32) -> PathBuf {
+        self.folder(id).join("sheets")
+    }
+
+    /// Makes a job's record durable.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn save(&self, job: &Job) -> Result<(), StoreError> {
+        let folder = self.folder(job.id);
+        durable::make_folder(&folder, Access::Private).map_err(failed("make", &folder))?;
+        let path = folder.join("job.json");
+        let text = serde_json::to_vec(job).map_err(|error| failed("write", &path)(error.into()))?;
+        durable::write(&path, &text, Access::Private).map_err(failed("write", &path))
+    }
+
+    /// Removes what a job that is over does not need any more: its document and its sheets; with `all` its record, too.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn clear(&self, id: u32, all: bool) -> Result<(), StoreError> {
+        let folder = self.folder(id);
+        if all {
+            return match fs::remove_dir_all(&folder) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                    Err(failed("remove", &folder)(error))
+                }
+                _ => Ok(()),
+            };
+        }
+        for entry in fs::read_dir(&folder).map_err(failed("read", &folder))? {
+            let path = entry.map_err(failed("read", &folder))?.path();
+            let removed = match path.file_name().is_some_and(|name| name == "job.json") {
+                true => Ok(()),
+                false if path.is_dir() => fs::remove_dir_all(&path),
+                false => fs::remove_file(&path),
+            };
+            removed.map_err(failed("remove", &path))?;
+        }
+        Ok(())
+    }
+
+    /// Forgets the oldest of the jobs that are over. The newest job stays, so that no number is given twice.
+    ///
+    /// # Errors
+    /// The disk says no.
+    pub fn tidy(&self, jobs: &mut BTreeMap<u32, Job>) -> Result<(), StoreError> {
+        let over: Vec<u32> = jobs.values().filter(|job| job.state.is_over()).map(|job| job.id).collect();
+        for id in &over[..over.len().saturating_sub(KEPT)] {
+            self.clear(*id, true)?;
+            jobs.remove(id);
+        }
+        Ok(())
+    }
+}
+
+fn read(folder: &Path) -> Option<Job> {
+    let path = folder.join("job.json");
+    if fs::metadata(&path).ok()?.len() > LARGEST_RECORD {
+        return None;
+    }
+    serde_json::from_slice(&fs::read(path).ok()?).ok()
+}
+
+/// What becomes of a job when the server begins again.
+pub fn after_restart(job: &mut Job, now: u64) {
+    match job.state {
+        State::Incoming => {
+            (job.state, job.ended) = (State::Aborted, Some(now));
+            job.message = "the server ended before the document was here; print it again".into();
+        }
+        State::Processing => job.state = State::Pending,
+        _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A job of this number in this state.
+    fn job(id: u32, state: State) -> Job {
+        Job {
+            id,
+            printer: "standard".into(),
+            name: "leaf".into(),
+            user: "me".into(),
+            ticket: Ticket::default(),
+            document: Some("document.pdf".into()),
+            format: "application/pdf".into(),
+            octets: 9,
+            state,
+            cancel: false,
+            message: String::new(),
+            created: 1_795_000_000,
+            begun: None,
+            ended: None,
+            sheets: None,
+            done: 0,
+        }
+    }
+
+    #[test]
+    fn jobs_come_back_and_what_is_no_job_goes() {
+        let folder = tempfile::tempdir().unwrap();
+        let (store, jobs) = Store::open(folder.path()).unwrap();
+        assert!(jobs.is_empty());
+        for (id, state) in
+            [(1, State::Completed), (2, State::Processing), (3, State::Incoming), (4, State::Held)]
+        {
+            store.save(&job(id, state)).unwrap();
+            fs::write(store.folder(id).join("document.pdf"), "%PDF").unwrap();
+        }
+        // A folder that was made, and nothing in it was saved.
+        fs::create_dir(store.folder(5)).unwrap();
+        fs::write(store.folder(5).join("document.part"), "%P").unwrap();
+        let (store, mut jobs) = Store::open(folder.path()).unwrap();
+        assert_eq!(jobs.keys().copied().collect::<Vec<_>>(), [1, 2, 3, 4]);
+        assert!(!store.folder(5).exists());
+        jobs.values_mut().for_each(|job| after_restart(job, 7));
+        let states: Vec<State> = jobs.values().map(|job| job.state).collect();
+        assert_eq!(states, [State::Completed, State::Pending, State::Aborted, State::Held]);
+        store.clear(1, false).unwrap();
+        assert!(!store.folder(1).join("document.pdf").exists() && store.folder(1).join("job.json").exists());
+    }
+
+    #[test]
+    fn the_last_records_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let (store, mut jobs) = Store::open(folder.path()).unwrap();
+        for id in 1..=KEPT as u32 + 3 {
+            let state = if id == 2 { State::Held } else { State::Completed };
+            store.save(&job(id, state)).unwrap();
+            jobs.insert(id, job(id, state));
+        }
+        store.tidy(&mut jobs).unwrap();
+        assert_eq!(jobs.len(), KEPT + 1);
+        assert!(jobs.contains_key(&2) && !jobs.contains_key(&1) && !jobs.contains_key(&3));
+        assert_eq!(Store::open(folder.path()).unwrap().1, jobs);
+    }
+}

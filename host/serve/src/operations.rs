@@ -1,0 +1,620 @@
+//! What clients ask for: one function for each operation, and the attributes of jobs.
+//!
+//! Method: a request that has a document is judged before the document is read ([`begin`]); when it is on disk the job is answered for
+//! ([`arrived`]). All others are answered at once ([`answer`]).
+//! Limits: one document for a job. Whose a job is, is what the client says: on a network that everybody may print on, this is a name and
+//! not a proof.
+//! Source: RFC 8011, section 4; PWG 5100.7, 5100.11 and 5100.14.
+
+use std::path::{Path, PathBuf};
+
+use ipp::model::{DelimiterTag, Operation, StatusCode};
+use ipp::value::IppValue;
+
+use crate::jobs::{Job, State};
+use crate::printer;
+use crate::server::{ChangeError, Data, Preset, Server};
+use crate::spool::{KINDS, Kind, Packing, SpoolError};
+use crate::template::{AUTO, Ticket, keyword_of};
+use crate::values::{
+    date_time, each, integer, keyword, keywords, list, name, now, range, read_text, text, uri,
+};
+use crate::wire::{Request, Response};
+use queue::messages::Reason;
+
+/// The operations there are.
+pub const OPERATIONS: [Operation; 14] = [
+    Operation::PrintJob,
+    Operation::ValidateJob,
+    Operation::CreateJob,
+    Operation::SendDocument,
+    Operation::CancelJob,
+    Operation::GetJobAttributes,
+    Operation::GetJobs,
+    Operation::GetPrinterAttributes,
+    Operation::HoldJob,
+    Operation::ReleaseJob,
+    Operation::CancelJobs,
+    Operation::CancelMyJobs,
+    Operation::CloseJob,
+    Operation::IdentifyPrinter,
+];
+
+/// Where a request came in.
+#[derive(Clone, Debug)]
+pub struct Place {
+    /// The host and port the client has called, for the addresses in answers.
+    pub host: String,
+    /// Whether the connection is encrypted.
+    pub is_encrypted: bool,
+    /// The printer's name in the path; empty for none.
+    pub printer: String,
+}
+
+impl Place {
+    /// The address of a printer.
+    pub fn printer(&self, name: &str) -> String {
+        self.as_scheme(if self.is_encrypted { "ipps" } else { "ipp" }, name)
+    }
+
+    /// The same with or without encryption.
+    pub fn as_scheme(&self, scheme: &str, name: &str) -> String {
+        format!("{scheme}://{}/ipp/print/{name}", self.host)
+    }
+
+    /// The address of a page.
+    pub fn page(&self, path: &str) -> String {
+        let scheme = if self.is_encrypted { "https" } else { "http" };
+        format!("{scheme}://{}/{path}", self.host)
+    }
+}
+
+/// What is to be done with the document behind a request.
+pub struct Incoming {
+    /// The job it belongs to.
+    pub job: u32,
+    /// How it is packed.
+    pub packing: Packing,
+    /// Whether the job is complete with it.
+    pub is_last: bool,
+    /// Whether the job was made for this document, and goes if it does not arrive.
+    is_own: bool,
+    /// What of the request is not possible here.
+    unsupported: Vec<(String, IppValue)>,
+}
+
+fn status(request: &Request, status: StatusCode, words: &str) -> Response {
+    Response::new(&request.header, status).saying(words)
+}
+
+fn failed(request: &Request, error: &ChangeError) -> Response {
+    let code = match error {
+        ChangeError::NoJob => StatusCode::ClientErrorNotFound,
+        ChangeError::State(_) => StatusCode::ClientErrorNotPossible,
+        ChangeError::Busy => StatusCode::ServerErrorBusy,
+        ChangeError::Sheet => StatusCode::ClientErrorAttributesOrValuesNotSupported,
+        ChangeError::Store(_) | ChangeError::Disk(_) => StatusCode::ServerErrorInternalError,
+    };
+    status(request, code, &observe::with_causes(error))
+}
+
+fn operation(request: &Request) -> Option<Operation> {
+    OPERATIONS.into_iter().find(|known| *known as i16 == request.header.operation_or_status)
+}
+
+/// Whether a request may have a document behind it.
+pub fn takes_document(request: &Request) -> bool {
+    matches!(operation(request), Some(Operation::PrintJob | Operation::SendDocument))
+}
+
+/// The last part of the address a request is about, which must be a printer's or a job's here.
+fn target<'a>(
+    server: &'a Server,
+    place: &Place,
+    request: &Request,
+) -> Result<(&'a Preset, Option<u32>), Response> {
+    let bad = |words: &str| status(request, StatusCode::ClientErrorBadRequest, words);
+    let printer = request.operation("printer-uri").and_then(read_text);
+    let job = request.operation("job-uri").and_then(read_text);
+    let id = match request.operation("job-id") {
+        Some(IppValue::Integer(id)) => Some(u32::try_from(*id).unwrap_or(0)),
+        Some(_) => return Err(bad("the job's number is of another kind")),
+        None => None,
+    };
+    let path = |address: &str| -> Option<String> {
+        let rest = address.split_once("://")?.1;
+        Some(rest.split_once('/').map_or("", |(_, path)| path).trim_matches('/').to_owned())
+    };
+    let (path, id) = match (printer, job) {
+        (Some(printer), _) => (path(&printer), id),
+        (None, Some(job)) => {
+            let found = path(&job).and_then(|path| {
+                let (printer, id) = path.rsplit_once('/')?;
+                Some((printer.to_owned(), id.parse().ok()?))
+            });
+            match found {
+                Some((printer, id)) => (Some(printer), Some(id)),
+                None => return Err(bad("the address of the job is none")),
+            }
+        }
+        (None, None) => return Err(bad("the request names no printer")),
+    };
+    let missing = || status(request, StatusCode::ClientErrorNotFound, "there is no such printer");
+    let name = match path.as_deref() {
+        // Some clients call a printer by its host alone.
+        Some("" | "ipp" | "ipp/print") => place.printer.as_str(),
+        Some(path) => path.strip_prefix("ipp/print/").ok_or_else(missing)?,
+        None => return Err(bad("the address of the printer is none")),
+    };
+    Ok((server.printer(name).ok_or_else(missing)?, id))
+}
+
+fn job_of(server: &Server, place: &Place, request: &Request) -> Result<u32, Response> {
+    let (_, id) = target(server, place, request)?;
+    let id =
+        id.ok_or_else(|| status(request, StatusCode::ClientErrorBadRequest, "the request names no job"))?;
+    match server.data().jobs.contains_key(&id) {
+        true => Ok(id),
+        false => Err(status(request, StatusCode::ClientErrorNotFound, "there is no such job")),
+    }
+}
+
+/// A ticket, and what of the request is not possible.
+fn ticket(request: &Request) -> Result<(Ticket, Vec<(String, IppValue)>), Response> {
+    let (mut ticket, mut unsupported) = (Ticket::default(), Vec::new());
+    for attribute in request.job() {
+        if !ticket.take(attribute.name(), attribute.value()) {
+            unsupported.push((attribute.name().to_string(), attribute.value().clone()));
+        }
+    }
+    let must = matches!(request.operation("ipp-attribute-fidelity"), Some(IppValue::Boolean(true)));
+    if must && !unsupported.is_empty() {
+        let code = StatusCode::ClientErrorAttributesOrValuesNotSupported;
+        let mut response = status(request, code, "not every attribute is possible");
+        add_unsupported(&mut response, &unsupported);
+        return Err(response);
+    }
+    Ok((ticket, unsupported))
+}
+
+fn add_unsupported(response: &mut Response, unsupported: &[(String, IppValue)]) {
+    for (name, value) in unsupported {
+        response.add(DelimiterTag::UnsupportedAttributes, name, value.clone());
+    }
+}
+
+/// How the document is packed, if it is of a kind that is printed.
+fn document(request: &Request) -> Result<Packing, Response> {
+    let format = request.operation("document-format").and_then(read_text);
+    let is_known =
+        |format: &str| format == "application/octet-stream" || KINDS.iter().any(|kind| kind.mime == format);
+    if let Some(format) = format.filter(|format| !is_known(&format.to_ascii_lowercase())) {
+        let code = StatusCode::ClientErrorDocumentFormatNotSupported;
+        let mut response = status(request, code, "documents of this type are not printed");
+        response.add(DelimiterTag::UnsupportedAttributes, "document-format", crate::values::mime(&format));
+        return Err(response);
+    }
+    match request.operation("compression").and_then(read_text).as_deref() {
+        None | Some("none") => Ok(Packing::None),
+        Some("deflate") => Ok(Packing::Deflate),
+        Some("gzip") => Ok(Packing::Gzip),
+        Some(other) => {
+            let code = StatusCode::ClientErrorCompressionNotSupported;
+            let mut response = status(request, code, "documents packed like this are not read");
+            response.add(DelimiterTag::UnsupportedAttributes, "compression", keyword(other));
+            Err(response)
+        }
+    }
+}
+
+fn user(request: &Request) -> String {
+    request.operation("requesting-user-name").and_then(read_text).unwrap_or_else(|| "anonymous".into())
+}
+
+fn create(server: &Server, printer: &Preset, request: &Request, ticket: Ticket) -> Result<u32, Response> {
+    let named =
+        |attribute: &str| request.operation(attribute).and_then(read_text).filter(|name| !name.is_empty());
+    let name = named("job-name").or_else(|| named("document-name")).unwrap_or_else(|| "Untitled".into());
+    server.create(printer, &name, &user(request), ticket).map_err(|error| failed(request, &error))
+}
+
+/// Judges a request that may have a document, before the document is read.
+///
+/// # Errors
+/// The answer of a request that is refused.
+pub fn begin(server: &Server, place: &Place, request: &Request) -> Result<Incoming, Response> {
+    let packing = document(request)?;
+    if operation(request) == Some(Operation::PrintJob) {
+        let (printer, _) = target(server, place, request)?;
+        let (ticket, unsupported) = ticket(request)?;
+        let job = create(server, printer, request, ticket)?;
+        return Ok(Incoming { job, packing, is_last: true, is_own: true, unsupported });
+    }
+    let job = job_of(server, place, request)?;
+    let is_last = match request.operation("last-document") {
+        Some(IppValue::Boolean(last)) => *last,
+        _ => {
+            let words = "the request does not say whether this is the last document";
+            return Err(status(request, StatusCode::ClientErrorBadRequest, words));
+        }
+    };
+    match server.data().jobs.get(&job) {
+        Some(Job { state: State::Incoming, .. }) => {
+            Ok(Incoming { job, packing, is_last, is_own: false, unsupported: Vec::new() })
+        }
+        _ => Err(status(request, StatusCode::ClientErrorNotPossible, "the job has its document already")),
+    }
+}
+
+/// The client has gone in the middle of a document.
+pub fn gone(server: &Server, incoming: &Incoming) {
+    if incoming.is_own {
+        server.forget(incoming.job);
+    }
+}
+
+/// Answers for a document that has arrived, or not.
+pub fn arrived(
+    server: &Server,
+    place: &Place,
+    request: &Request,
+    incoming: &Incoming,
+    spooled: Result<(PathBuf, Kind, u64), SpoolError>,
+) -> Response {
+    let id = incoming.job;
+    let kept = match spooled {
+        // The last of several documents may be none.
+        Err(SpoolError::Empty) if !incoming.is_own && incoming.is_last => Ok(()),
+        Err(error) => {
+            if incoming.is_own {
+                server.forget(id);
+            }
+            let code = match &error {
+                SpoolError::TooLarge => StatusCode::ClientErrorRequestEntityTooLong,
+                SpoolError::Packing => StatusCode::ClientErrorCompressionError,
+                SpoolError::Kind => StatusCode::ClientErrorDocumentFormatNotSupported,
+                SpoolError::Empty => StatusCode::ClientErrorBadRequest,
+                SpoolError::Disk(_) => StatusCode::ServerErrorInternalError,
+            };
+            return status(request, code, &observe::with_causes(&error));
+        }
+        Ok((path, kind, octets)) => keep_document(server, id, &path, kind, octets),
+    };
+    let kept = match incoming.is_last {
+        true => kept.and_then(|()| server.arrived(id)),
+        false => kept,
+    };
+    match kept {
+        Ok(()) => job_answer(server, place, request, id, &incoming.unsupported),
+        Err(error) => failed(request, &error),
+    }
+}
+
+/// A job has this document.
+///
+/// # Errors
+/// It has one already, or it cannot be kept.
+pub fn keep_document(
+    server: &Server,
+    id: u32,
+    path: &Path,
+    kind: Kind,
+    octets: u64,
+) -> Result<(), ChangeError> {
+    server.change(id, |job| {
+        if job.document.is_some() {
+            return Err(ChangeError::State("one with a document already"));
+        }
+        job.document = path.file_name().map(|name| name.to_string_lossy().into_owned());
+        (job.format, job.octets) = (kind.mime.into(), octets);
+        Ok(())
+    })
+}
+
+/// The answer to whoever has made a job.
+fn job_answer(
+    server: &Server,
+    place: &Place,
+    request: &Request,
+    id: u32,
+    unsupported: &[(String, IppValue)],
+) -> Response {
+    let mut response = Response::new(&request.header, StatusCode::SuccessfulOk);
+    if !unsupported.is_empty() {
+        response.set_status(StatusCode::SuccessfulOkIgnoredOrSubstitutedAttributes);
+        add_unsupported(&mut response, unsupported);
+    }
+    let uuid = server.uuid(&format!("job {id}"));
+    let data = server.data();
+    if let Some(job) = data.jobs.get(&id) {
+        let wanted = ["job-id", "job-uri", "job-uuid", "job-state", "job-state-reasons", "job-state-message"];
+        for (name, value) in attributes(server, &data, place, job, &uuid) {
+            if wanted.contains(&name) {
+                response.add(DelimiterTag::JobAttributes, name, value);
+            }
+        }
+    }
+    response
+}
+
+/// Answers a request that has no document.
+pub fn answer(server: &Server, place: &Place, request: &Request) -> Response {
+    match answered(server, place, request) {
+        Ok(response) | Err(response) => response,
+    }
+}
+
+fn answered(server: &Server, place: &Place, request: &Request) -> Result<Response, Response> {
+    let ok = || Response::new(&request.header, StatusCode::SuccessfulOk);
+    let change = |done: Result<(), ChangeError>| done.map(|()| ok()).map_err(|error| failed(request, &error));
+    let Some(operation) = operation(request) else {
+        return Err(status(
+            request,
+            StatusCode::ServerErrorOperationNotSupported,
+            "there is no such operation",
+        ));
+    };
+    match operation {
+        Operation::ValidateJob => {
+            target(server, place, request)?;
+            document(request)?;
+            let (_, unsupported) = ticket(request)?;
+            let mut response = ok();
+            if !unsupported.is_empty() {
+                response.set_status(StatusCode::SuccessfulOkIgnoredOrSubstitutedAttributes);
+                add_unsupported(&mut response, &unsupported);
+            }
+            Ok(response)
+        }
+        Operation::CreateJob => {
+            let (printer, _) = target(server, place, request)?;
+            let (ticket, unsupported) = ticket(request)?;
+            let id = create(server, printer, request, ticket)?;
+            Ok(job_answer(server, place, request, id, &unsupported))
+        }
+        Operation::GetPrinterAttributes => {
+            let (printer, _) = target(server, place, request)?;
+            let wanted = Wanted::of(request, &["all"]);
+            let mut response = ok();
+            for (group, name, value) in printer::attributes(server, printer, place) {
+                if wanted.has(name, group) {
+                    response.add(DelimiterTag::PrinterAttributes, name, value);
+                }
+            }
+            Ok(response)
+        }
+        Operation::GetJobs => get_jobs(server, place, request),
+        Operation::GetJobAttributes => {
+            let id = job_of(server, place, request)?;
+            let wanted = Wanted::of(request, &["all"]);
+            let uuid = server.uuid(&format!("job {id}"));
+            let (mut response, data) = (ok(), server.data());
+            if let Some(job) = data.jobs.get(&id) {
+                add_job(&mut response, attributes(server, &data, place, job, &uuid), &wanted);
+            }
+            Ok(response)
+        }
+        Operation::CancelJob => change(server.cancel(job_of(server, place, request)?)),
+        Operation::HoldJob => change(server.hold(job_of(server, place, request)?)),
+        Operation::ReleaseJob => change(server.release(job_of(server, place, request)?)),
+        Operation::CloseJob => {
+            let id = job_of(server, place, request)?;
+            let is_open = server.data().jobs.get(&id).is_some_and(|job| job.state == State::Incoming);
+            if is_open { change(server.arrived(id)) } else { Ok(ok()) }
+        }
+        Operation::CancelMyJobs | Operation::CancelJobs => {
+            let (printer, _) = target(server, place, request)?;
+            let mine = user(request);
+            let asked: Option<Vec<u32>> = request.operation("job-ids").map(|ids| {
+                let number = |id: &IppValue| match id {
+                    IppValue::Integer(id) => u32::try_from(*id).ok(),
+                    _ => None,
+                };
+                each(ids).iter().filter_map(number).collect()
+            });
+            let theirs = |job: &Job| job.printer == printer.name && job.user == mine;
+            let jobs: Vec<u32> = {
+                let data = server.data();
+                if let Some(asked) = &asked
+                    && asked.iter().any(|id| !data.jobs.get(id).is_some_and(theirs))
+                {
+                    return Err(status(
+                        request,
+                        StatusCode::ClientErrorNotFound,
+                        "not all are jobs of yours",
+                    ));
+                }
+                let open = data.jobs.values().filter(|job| theirs(job) && !job.state.is_over());
+                let open = open.map(|job| job.id);
+                open.filter(|id| asked.as_ref().is_none_or(|asked| asked.contains(id))).collect()
+            };
+            for id in jobs {
+                // One that has ended meanwhile is over all the same.
+                match server.cancel(id) {
+                    Err(ChangeError::State(_) | ChangeError::NoJob) | Ok(()) => {}
+                    Err(error) => return Err(failed(request, &error)),
+                }
+            }
+            Ok(ok())
+        }
+        Operation::IdentifyPrinter => {
+            let (printer, _) = target(server, place, request)?;
+            let words = request.operation("message").and_then(read_text).unwrap_or_default();
+            server.observer.note(&format!("somebody wants to see the printer {} {words}", printer.name));
+            server.data().identify = now();
+            Ok(ok())
+        }
+        _ => Err(status(request, StatusCode::ServerErrorOperationNotSupported, "there is no such operation")),
+    }
+}
+
+fn get_jobs(server: &Server, place: &Place, request: &Request) -> Result<Response, Response> {
+    let (printer, _) = target(server, place, request)?;
+    let wanted = Wanted::of(request, &["job-id", "job-uri"]);
+    let is_over = match request.operation("which-jobs").and_then(read_text).as_deref() {
+        None | Some("not-completed") => Some(false),
+        Some("completed") => Some(true),
+        Some("all") => None,
+        Some(other) => {
+            let code = StatusCode::ClientErrorAttributesOrValuesNotSupported;
+            let mut response = status(request, code, "there is no such choice of jobs");
+            response.add(DelimiterTag::UnsupportedAttributes, "which-jobs", keyword(other));
+            return Err(response);
+        }
+    };
+    let mine = matches!(request.operation("my-jobs"), Some(IppValue::Boolean(true))).then(|| user(request));
+    let limit = match request.operation("limit") {
+        Some(IppValue::Integer(limit)) => usize::try_from(*limit).unwrap_or(usize::MAX),
+        _ => usize::MAX,
+    };
+    let mut response = Response::new(&request.header, StatusCode::SuccessfulOk);
+    let fits = |job: &&Job| {
+        job.printer == printer.name
+            && is_over.is_none_or(|over| job.state.is_over() == over)
+            && mine.as_ref().is_none_or(|mine| job.user == *mine)
+    };
+    let data = server.data();
+    let mut jobs: Vec<&Job> = data.jobs.values().filter(fits).collect();
+    if is_over == Some(true) {
+        // The last to end comes first.
+        jobs.sort_by_key(|job| std::cmp::Reverse((job.ended, job.id)));
+    }
+    for job in jobs.into_iter().take(limit) {
+        let uuid = crate::server::identity(&data, &format!("job {}", job.id));
+        response.begin(DelimiterTag::JobAttributes);
+        add_job(&mut response, attributes(server, &data, place, job, &uuid), &wanted);
+    }
+    Ok(response)
+}
+
+fn add_job(response: &mut Response, attributes: Vec<(&'static str, IppValue)>, wanted: &Wanted) {
+    for (name, value) in attributes {
+        let group = if TEMPLATE.contains(&name) { "job-template" } else { "job-description" };
+        if wanted.has(name, group) {
+            response.add(DelimiterTag::JobAttributes, name, value);
+        }
+    }
+}
+
+/// The attributes that a client wants to see.
+pub struct Wanted(Vec<String>);
+
+impl Wanted {
+    fn of(request: &Request, usual: &[&str]) -> Wanted {
+        Wanted(match request.operation("requested-attributes") {
+            Some(value) => each(value).iter().filter_map(read_text).collect(),
+            None => usual.iter().map(ToString::to_string).collect(),
+        })
+    }
+
+    fn has(&self, name: &str, group: &str) -> bool {
+        // The table of all sheets is long, and is given to whoever names it.
+        let by_group = name != "media-col-database";
+        self.0.iter().any(|wanted| wanted == name || by_group && (wanted == "all" || wanted == group))
+    }
+}
+
+/// What of a job is as its owner wants it.
+const TEMPLATE: [&str; 9] = [
+    "copies",
+    "media",
+    "media-col",
+    "page-ranges",
+    "print-quality",
+    "print-content-optimize",
+    "print-rendering-intent",
+    "print-color-mode",
+    "sides",
+];
+
+/// A reason that stops a job, as its own.
+fn stops(reason: Reason) -> bool {
+    !matches!(reason, Reason::SupplyMissing)
+}
+
+/// The state of a job in numbers, and its reasons.
+pub fn state(data: &Data, job: &Job) -> (i32, Vec<&'static str>) {
+    match job.state {
+        State::Incoming => (4, vec!["job-incoming"]),
+        State::Pending => (3, vec!["none"]),
+        State::Held if job.ticket.held && job.begun.is_none() => (4, vec!["job-hold-until-specified"]),
+        State::Held => (4, vec!["job-held-on-create"]),
+        State::Processing if job.cancel => (5, vec!["processing-to-stop-point"]),
+        State::Processing if data.reasons.iter().any(|&reason| stops(reason)) => {
+            (6, vec!["printer-stopped", "job-printing"])
+        }
+        State::Processing if job.sheets.is_none() => (5, vec!["job-transforming"]),
+        State::Processing => (5, vec!["job-printing"]),
+        State::Canceled => (7, vec!["job-canceled-by-user"]),
+        State::Aborted => (8, vec!["aborted-by-system"]),
+        State::Completed => (9, vec!["job-completed-successfully"]),
+    }
+}
+
+/// Seconds the printer had been up at a moment; what was before its start is 0.
+fn up(server: &Server, moment: Option<u64>) -> IppValue {
+    let began = now().saturating_sub(server.started.elapsed().as_secs());
+    moment.map_or(IppValue::NoValue, |moment| integer(moment.saturating_sub(began)))
+}
+
+/// All that can be known of a job.
+pub fn attributes(
+    server: &Server,
+    data: &Data,
+    place: &Place,
+    job: &Job,
+    uuid: &str,
+) -> Vec<(&'static str, IppValue)> {
+    let (number, reasons) = state(data, job);
+    let date = |moment: Option<u64>| moment.map_or(IppValue::NoValue, date_time);
+    let printer = place.printer(&job.printer);
+    let sheets = job.sheets.map_or(IppValue::NoValue, integer);
+    let before = data.jobs.values().filter(|other| !other.state.is_over() && other.id < job.id).count();
+    let ticket = &job.ticket;
+    let word = |word: &Option<String>, usual: &str| keyword(word.as_deref().unwrap_or(usual));
+    let mut all = vec![
+        ("job-id", integer(job.id)),
+        ("job-uri", uri(&format!("{printer}/{}", job.id))),
+        ("job-uuid", uri(&format!("urn:uuid:{uuid}"))),
+        ("job-printer-uri", uri(&printer)),
+        ("job-more-info", uri(&place.page(""))),
+        ("job-name", name(&job.name)),
+        ("job-originating-user-name", name(&job.user)),
+        ("job-state", IppValue::Enum(number)),
+        ("job-state-reasons", keywords(reasons)),
+        ("job-state-message", text(&job.message)),
+        ("number-of-documents", integer(i32::from(job.document.is_some()))),
+        ("document-format-supplied", crate::values::mime(&job.format)),
+        ("job-k-octets", integer(job.octets.div_ceil(1024))),
+        ("job-impressions", sheets.clone()),
+        ("job-impressions-completed", integer(job.done)),
+        ("job-media-sheets", sheets),
+        ("job-media-sheets-completed", integer(job.done)),
+        ("job-printer-up-time", integer(server.started.elapsed().as_secs() + 1)),
+        ("time-at-creation", up(server, Some(job.created))),
+        ("time-at-processing", up(server, job.begun)),
+        ("time-at-completed", up(server, job.ended)),
+        ("date-time-at-creation", date(Some(job.created))),
+        ("date-time-at-processing", date(job.begun)),
+        ("date-time-at-completed", date(job.ended)),
+        ("number-of-intervening-jobs", integer(before)),
+        ("copies", integer(ticket.copies)),
+        ("sides", keyword("one-sided")),
+        ("print-quality", IppValue::Enum(ticket.quality.unwrap_or(4))),
+        ("print-content-optimize", word(&ticket.content, AUTO)),
+        ("print-rendering-intent", word(&ticket.intent, AUTO)),
+        ("print-color-mode", word(&ticket.colour, AUTO)),
+    ];
+    let loaded = data.loaded();
+    let size = ticket.size.unwrap_or(loaded.size);
+    let kind = ticket.kind.as_deref().unwrap_or(&loaded.kind);
+    all.push(("media", keyword(&keyword_of(size))));
+    all.push(("media-col", printer::media_col(size, Some(kind))));
+    if !ticket.pages.is_empty() {
+        all.push(("page-ranges", list(ticket.pages.iter().map(|&(from, to)| range(from, to)))));
+    }
+    if let Some(percent) = data.percent.filter(|_| job.state == State::Processing) {
+        all.push(("job-media-progress", integer(percent)));
+    }
+    all
+}

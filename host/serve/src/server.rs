@@ -1,0 +1,506 @@
+//! The server: its printers, its jobs, and what the one device behind them does.
+//!
+//! Method: one lock over all that changes. Whoever changes a job has it on disk before the lock is given back, so nobody is ever told of
+//! a state that a restart would undo. One thread prints ([`crate::worker`]); it is woken when there is something to do.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use files::durable::{self, Access};
+use inks::Library;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
+
+use crate::jobs::{Job, State, Store, StoreError, after_restart};
+use crate::template::{Size, TYPES, Ticket, paper, size};
+use crate::values::now;
+use device::connection::Destination;
+use device::printers::Printers;
+use observe::Observer;
+use protocol::paper::Paper;
+use queue::messages::Reason;
+use queue::options::Choices;
+
+/// The most jobs that wait.
+pub const MOST_JOBS: usize = 500;
+
+/// A printer: a preset under a name.
+#[derive(Clone, Debug)]
+pub struct Preset {
+    /// Its name, and the last part of its address.
+    pub name: String,
+    /// What it is, for people.
+    pub about: String,
+    /// How it draws.
+    pub choices: Choices,
+}
+
+/// What a server is made of.
+pub struct Settings {
+    /// Where sheets go. A file is a folder for them.
+    pub to: Destination,
+    /// The printers; the first is the one without a name.
+    pub printers: Vec<Preset>,
+    /// Where jobs are kept.
+    pub folder: PathBuf,
+    /// The inks.
+    pub library: Library,
+    /// What is known of devices.
+    pub devices: Printers,
+    /// The names under which this computer is asked for.
+    pub hosts: Vec<String>,
+    /// What somebody elsewhere has to know to change things.
+    pub code: String,
+}
+
+/// What a cartridge says of itself.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct Cartridge {
+    /// Its ink.
+    pub name: String,
+    /// How it looks in a dialog.
+    pub colour: &'static str,
+    /// Whether there is ribbon.
+    pub is_loaded: bool,
+}
+
+/// The sheet that is in the printer, as somebody has said.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct Loaded {
+    /// Its size.
+    pub size: Size,
+    /// What it is made of; [`crate::template::AUTO`] for what the preset says.
+    pub kind: String,
+}
+
+/// What outlives the process beside jobs.
+#[derive(Clone, Serialize, Deserialize)]
+struct Kept {
+    /// Makes the identities of printers this computer's own.
+    seed: String,
+    loaded: Loaded,
+}
+
+/// What changes.
+pub struct Data {
+    /// All jobs that are known.
+    pub jobs: BTreeMap<u32, Job>,
+    next: u32,
+    /// Why the device does not print, or soon will not.
+    pub reasons: Vec<Reason>,
+    /// What it does, for people.
+    pub message: String,
+    /// Percent of the sheet that is on its way.
+    pub percent: Option<u64>,
+    /// The cartridges it has found; none before it was asked.
+    pub cartridges: Vec<Cartridge>,
+    kept: Kept,
+    /// When any of this changed, in seconds since 1970.
+    pub changed: u64,
+    /// When the sheet changed.
+    pub configured: u64,
+    /// Somebody wants to see which printer this is.
+    pub identify: u64,
+}
+
+impl Data {
+    /// The sheet that is loaded.
+    pub fn loaded(&self) -> &Loaded {
+        &self.kept.loaded
+    }
+
+    /// The job that is printed now.
+    pub fn current(&self) -> Option<&Job> {
+        self.jobs.values().find(|job| job.state == State::Processing)
+    }
+
+    /// Jobs that are not over.
+    pub fn open(&self) -> usize {
+        self.jobs.values().filter(|job| !job.state.is_over()).count()
+    }
+}
+
+/// Why a server does not begin.
+#[derive(Debug, thiserror::Error)]
+pub enum BeginError {
+    /// The folder of jobs.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// A file beside them.
+    #[error("{}: cannot be read or written", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        #[source]
+        source: std::io::Error,
+    },
+    /// Another server.
+    #[error("another `foilpress serve` keeps its jobs in {}; stop it, or choose another folder with --jobs", .0.display())]
+    Twice(PathBuf),
+}
+
+/// Why nothing was changed.
+#[derive(Debug, thiserror::Error)]
+pub enum ChangeError {
+    /// No such job.
+    #[error("there is no such job")]
+    NoJob,
+    /// Its state does not allow it.
+    #[error("the job is {0}")]
+    State(&'static str),
+    /// The most jobs wait already.
+    #[error("{MOST_JOBS} jobs wait already; try again later")]
+    Busy,
+    /// No such sheet.
+    #[error("the printer does not take such a sheet")]
+    Sheet,
+    /// The disk.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The disk.
+    #[error("cannot keep the loaded sheet")]
+    Disk(#[source] std::io::Error),
+}
+
+/// The server.
+pub struct Server {
+    /// What it was begun with.
+    pub settings: Settings,
+    /// Its jobs on disk.
+    pub store: Store,
+    data: Mutex<Data>,
+    wake: Condvar,
+    /// Held while a document is drawn: a page is 100 MB.
+    pub drawing: Mutex<()>,
+    /// When it began.
+    pub started: Instant,
+    /// Told what people at the terminal should know.
+    pub observer: Box<dyn Observer + Send>,
+    _lock: std::fs::File,
+}
+
+impl Server {
+    /// Begins, with the jobs that an earlier process has left.
+    ///
+    /// # Errors
+    /// What is on disk cannot be read or written.
+    pub fn begin(settings: Settings, observer: Box<dyn Observer + Send>) -> Result<Server, BeginError> {
+        let file = |path: &Path| {
+            let path = path.to_path_buf();
+            move |source| BeginError::File { path, source }
+        };
+        durable::make_folder(&settings.folder, Access::Private).map_err(file(&settings.folder))?;
+        let path = settings.folder.join("lock");
+        let lock = std::fs::File::create(&path).map_err(file(&path))?;
+        if lock.try_lock().is_err() {
+            return Err(BeginError::Twice(settings.folder));
+        }
+        let (store, mut jobs) = Store::open(&settings.folder.join("jobs"))?;
+        for job in jobs.values_mut() {
+            let before = job.clone();
+            after_restart(job, now());
+            if *job != before {
+                store.save(job)?;
+            }
+            if job.state.is_over() {
+                store.clear(job.id, false)?;
+            }
+        }
+        let kept = kept(&settings.folder).map_err(file(&settings.folder))?;
+        let data = Data {
+            next: jobs.keys().next_back().map_or(1, |last| last + 1),
+            jobs,
+            reasons: Vec::new(),
+            message: String::new(),
+            percent: None,
+            cartridges: Vec::new(),
+            kept,
+            changed: now(),
+            configured: now(),
+            identify: 0,
+        };
+        Ok(Server {
+            settings,
+            store,
+            data: Mutex::new(data),
+            wake: Condvar::new(),
+            drawing: Mutex::new(()),
+            started: Instant::now(),
+            observer,
+            _lock: lock,
+        })
+    }
+
+    /// All that changes. Not kept while anything is waited for.
+    pub fn data(&self) -> MutexGuard<'_, Data> {
+        self.data.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A printer by the last part of its address; the first without one.
+    pub fn printer(&self, name: &str) -> Option<&Preset> {
+        match name {
+            "" => self.settings.printers.first(),
+            name => self.settings.printers.iter().find(|printer| printer.name == name),
+        }
+    }
+
+    /// The identity of a printer, or of a job: the same after every start, and no other computer's.
+    pub fn uuid(&self, of: &str) -> String {
+        identity(&self.data(), of)
+    }
+
+    /// Takes a job without its document.
+    ///
+    /// # Errors
+    /// Too many wait, or it cannot be kept.
+    pub fn create(
+        &self,
+        printer: &Preset,
+        name: &str,
+        user: &str,
+        ticket: Ticket,
+    ) -> Result<u32, ChangeError> {
+        let mut data = self.data();
+        if data.open() >= MOST_JOBS {
+            return Err(ChangeError::Busy);
+        }
+        let id = data.next;
+        let job = Job {
+            id,
+            printer: printer.name.clone(),
+            name: name.into(),
+            user: user.into(),
+            ticket,
+            document: None,
+            format: "application/octet-stream".into(),
+            octets: 0,
+            state: State::Incoming,
+            cancel: false,
+            message: String::new(),
+            created: now(),
+            begun: None,
+            ended: None,
+            sheets: None,
+            done: 0,
+        };
+        self.store.save(&job)?;
+        data.next += 1;
+        data.jobs.insert(id, job);
+        data.changed = now();
+        let Data { jobs, .. } = &mut *data;
+        self.store.tidy(jobs)?;
+        Ok(id)
+    }
+
+    /// Changes a job, and has that on disk.
+    ///
+    /// # Errors
+    /// There is none, or it cannot be kept; then nothing has changed.
+    pub fn change<T>(
+        &self,
+        id: u32,
+        change: impl FnOnce(&mut Job) -> Result<T, ChangeError>,
+    ) -> Result<T, ChangeError> {
+        let mut data = self.data();
+        let mut job = data.jobs.get(&id).ok_or(ChangeError::NoJob)?.clone();
+        let done = change(&mut job)?;
+        self.store.save(&job)?;
+        data.jobs.insert(id, job);
+        data.changed = now();
+        drop(data);
+        self.wake.notify_all();
+        Ok(done)
+    }
+
+    /// A job's document is here: it waits for its turn, or until it is released.
+    ///
+    /// # Errors
+    /// As [`Server::change`].
+    pub fn arrived(&self, id: u32) -> Result<(), ChangeError> {
+        self.change(id, |job| match (job.state, &job.document) {
+            (State::Incoming, Some(_)) => {
+                job.state = if job.ticket.held { State::Held } else { State::Pending };
+                Ok(())
+            }
+            (State::Incoming, None) => {
+                (job.state, job.ended) = (State::Aborted, Some(now()));
+                job.message = "the job has no document".into();
+                Ok(())
+            }
+            _ => Err(ChangeError::State("complete already")),
+        })
+    }
+
+    /// A job whose document did not arrive is none.
+    pub fn forget(&self, id: u32) {
+        let mut data = self.data();
+        // What cannot be removed now is removed at the next start.
+        let _ = self.store.clear(id, true);
+        data.jobs.remove(&id);
+    }
+
+    /// Ends a job: at once if nothing of it is on its way, else as soon as the device allows.
+    ///
+    /// # Errors
+    /// It is over, or there is none.
+    pub fn cancel(&self, id: u32) -> Result<(), ChangeError> {
+        let over = self.change(id, |job| match job.state {
+            state if state.is_over() => Err(ChangeError::State("over")),
+            State::Processing => {
+                job.cancel = true;
+                job.message = "cancelling".into();
+                Ok(false)
+            }
+            _ => {
+                (job.cancel, job.state, job.ended) = (true, State::Canceled, Some(now()));
+                job.message = "cancelled".into();
+                Ok(true)
+            }
+        })?;
+        if over {
+            self.store.clear(id, false)?;
+        }
+        Ok(())
+    }
+
+    /// Holds a job that has not begun.
+    ///
+    /// # Errors
+    /// It has, or there is none.
+    pub fn hold(&self, id: u32) -> Result<(), ChangeError> {
+        self.change(id, |job| match job.state {
+            State::Pending | State::Held => {
+                job.state = State::Held;
+                Ok(())
+            }
+            State::Incoming => {
+                job.ticket.held = true;
+                Ok(())
+            }
+            _ => Err(ChangeError::State("not waiting")),
+        })
+    }
+
+    /// Releases a job that is held.
+    ///
+    /// # Errors
+    /// It is not, or there is none.
+    pub fn release(&self, id: u32) -> Result<(), ChangeError> {
+        self.change(id, |job| match job.state {
+            State::Held => {
+                job.state = State::Pending;
+                Ok(())
+            }
+            State::Incoming if job.ticket.held => {
+                job.ticket.held = false;
+                Ok(())
+            }
+            State::Pending => Ok(()),
+            _ => Err(ChangeError::State("not held")),
+        })
+    }
+
+    /// Somebody says which sheet is in the printer.
+    ///
+    /// # Errors
+    /// The printer takes no such sheet, or it cannot be kept.
+    pub fn load(&self, loaded: Loaded) -> Result<(), ChangeError> {
+        let is_kind = loaded.kind == crate::template::AUTO || TYPES.iter().any(|row| row.0 == loaded.kind);
+        if paper(loaded.size).is_none() || !is_kind {
+            return Err(ChangeError::Sheet);
+        }
+        let mut data = self.data();
+        let kept = Kept { loaded, ..data.kept.clone() };
+        keep(&self.settings.folder.join("server.json"), &kept).map_err(ChangeError::Disk)?;
+        (data.kept, data.configured, data.changed) = (kept, now(), now());
+        Ok(())
+    }
+
+    /// Waits for the next job to print; it is processing then.
+    pub fn next(&self) -> Job {
+        let mut data = self.data();
+        loop {
+            let next = data.jobs.values().find(|job| job.state == State::Pending).cloned();
+            if let Some(mut job) = next {
+                job.state = State::Processing;
+                job.begun.get_or_insert(now());
+                job.message.clear();
+                // If it cannot be saved it is printed all the same: a restart makes it pending again anyway.
+                let _ = self.store.save(&job);
+                data.jobs.insert(job.id, job.clone());
+                data.changed = now();
+                return job;
+            }
+            data = self.wake.wait(data).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// Ends jobs whose document has not come within this time.
+    pub fn time_out(&self, seconds: u64) {
+        let late: Vec<u32> = {
+            let data = self.data();
+            let late = |job: &&Job| job.state == State::Incoming && job.created + seconds < now();
+            data.jobs.values().filter(late).map(|job| job.id).collect()
+        };
+        for id in late {
+            let ended = self.change(id, |job| {
+                (job.state, job.ended) = (State::Aborted, Some(now()));
+                job.message = "the document did not come in time".into();
+                Ok(())
+            });
+            // Tried again the next time.
+            let _ = ended.and_then(|()| Ok(self.store.clear(id, false)?));
+        }
+    }
+}
+
+/// The identity of a printer or a job, see [`Server::uuid`].
+pub fn identity(data: &Data, of: &str) -> String {
+    uuid(&data.kept.seed, of)
+}
+
+/// The identities that printers of these names have where jobs are kept in this folder.
+///
+/// # Errors
+/// What the system says.
+pub fn identities(folder: &Path, printers: &[String]) -> std::io::Result<Vec<String>> {
+    durable::make_folder(folder, Access::Private)?;
+    let kept = kept(folder)?;
+    Ok(printers.iter().map(|name| uuid(&kept.seed, &format!("printer {name}"))).collect())
+}
+
+/// What is kept beside the jobs in a folder; made if it is not there or cannot be read.
+fn kept(folder: &Path) -> std::io::Result<Kept> {
+    let path = folder.join("server.json");
+    let kept = std::fs::read(&path).ok().and_then(|text| serde_json::from_slice::<Kept>(&text).ok());
+    if let Some(kept) = kept.filter(|kept| paper(kept.loaded.size).is_some()) {
+        return Ok(kept);
+    }
+    let mut seed = [0; 16];
+    crate::random(&mut seed)?;
+    let loaded = Loaded { size: size(Paper::A4), kind: crate::template::AUTO.into() };
+    let kept = Kept { seed: hex(&seed), loaded };
+    keep(&path, &kept)?;
+    Ok(kept)
+}
+
+fn keep(path: &Path, kept: &Kept) -> std::io::Result<()> {
+    durable::write(path, &serde_json::to_vec(kept)?, Access::Private)
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// An identity made of a seed and a name. Source: RFC 9562, version 8.
+fn uuid(seed: &str, of: &str) -> String {
+    let digest = Sha256::digest(format!("{seed}/{of}").as_bytes());
+    let mut bytes: Vec<u8> = digest.iter().copied().take(16).collect();
+    bytes[6] = bytes[6] & 0x0f | 0x80;
+    bytes[8] = bytes[8] & 0x3f | 0x80;
+    let text = hex(&bytes);
+    format!("{}-{}-{}-{}-{}", &text[..8], &text[8..12], &text[12..16], &text[16..20], &text[20..])
+}

@@ -1,0 +1,385 @@
+//! The options of print dialogs, and what they mean here: one table for what a printer offers, what a job asks for, and what is drawn.
+//!
+//! Problem: dialogs show size, type of sheet, quality, colour and copies, and nothing else; white, finish and spot colours are invisible
+//! to them. Method: those are a preset's, and each preset is a printer of its own; what dialogs show changes the preset's choices.
+//! `media-type` is the sheet and its curl, `print-quality` the resolution and the halftone, `print-content-optimize` and
+//! `print-rendering-intent` what becomes of colours out of reach, `print-color-mode` the inks.
+//! Limits: a sheet has one side and no finishings, and is printed upright.
+//! Source: RFC 8011, section 5.2; PWG 5100.3, 5100.7 and 5101.1.
+
+use ipp::value::IppValue;
+use protocol::paper::Paper;
+use protocol::rgl::Media;
+use serde::{Deserialize, Serialize};
+
+use crate::values::{each, read_text};
+use art::Intent;
+use halftone::Method;
+use inks::InkSet;
+use press::layout::paper::{custom_margins, custom_range, sheet_mm, table};
+use protocol::ink::Ink;
+use queue::options::Choices;
+use queue::ppd::paper_of;
+
+/// The sheets with a name, by the names of PWG 5101.1.
+pub const SHEETS: [(&str, Paper); 6] = [
+    ("iso_a4_210x297mm", Paper::A4),
+    ("na_letter_8.5x11in", Paper::Letter),
+    ("na_legal_8.5x14in", Paper::Legal),
+    ("na_executive_7.25x10.5in", Paper::Executive),
+    ("jis_b5_182x257mm", Paper::B5),
+    ("jpn_hagaki_100x148mm", Paper::Postcard),
+];
+
+/// What sheets are made of: keyword, words for people, the printer's media and whether it corrects the curl. The preset's own is `auto`.
+pub const TYPES: [(&str, &str, Media, bool); 6] = [
+    ("stationery", "Paper", Media::Plain, true),
+    ("cardstock", "Card", Media::Cardboard, true),
+    ("film", "Decal film", Media::Plain, false),
+    ("photographic-glossy", "Glossy paper", Media::GlossyPaper, true),
+    ("transparency", "Transparency", Media::Transparency, true),
+    ("labels", "Glossy labels", Media::GlossyLabel, true),
+];
+
+/// The type of sheet that a preset has.
+pub const AUTO: &str = "auto";
+
+/// `print-quality`: drafts are drawn at half the resolution, the best halftone searches.
+pub const QUALITIES: [i32; 3] = [3, 4, 5];
+/// `print-color-mode`.
+pub const COLOURS: [&str; 3] = ["auto", "color", "monochrome"];
+/// `print-content-optimize`, and the intent of each.
+pub const CONTENTS: [(&str, Option<Intent>); 5] = [
+    ("auto", None),
+    ("photo", Some(Intent::Perceptual)),
+    ("graphic", Some(Intent::Colorimetric)),
+    ("text", Some(Intent::Colorimetric)),
+    ("text-and-graphic", Some(Intent::Colorimetric)),
+];
+/// `print-rendering-intent`, and the intent of each.
+pub const INTENTS: [(&str, Option<Intent>); 3] =
+    [("auto", None), ("perceptual", Some(Intent::Perceptual)), ("relative", Some(Intent::Colorimetric))];
+/// The most copies.
+pub const MOST_COPIES: i32 = 99;
+/// Resolutions of the drawing.
+pub const RESOLUTIONS: [u16; 2] = [300, 600];
+/// Attributes that have one possible value.
+const FIXED: [(&str, &str); 6] = [
+    ("sides", "one-sided"),
+    ("output-bin", "face-up"),
+    ("job-sheets", "none"),
+    ("media-source", "main"),
+    ("multiple-document-handling", "separate-documents-uncollated-copies"),
+    ("print-scaling", "auto"),
+];
+
+/// Width and length of a sheet in hundredths of a millimetre, as IPP counts.
+pub type Size = (i32, i32);
+
+fn hundredths(mm: f64) -> i32 {
+    // Sheets are less than half a metre.
+    #[expect(clippy::cast_possible_truncation, reason = "within the size of a sheet")]
+    let number = (mm * 100.0).round() as i32;
+    number
+}
+
+/// The size of a paper.
+pub fn size(paper: Paper) -> Size {
+    let (width, length) = sheet_mm(paper);
+    (hundredths(width), hundredths(length))
+}
+
+/// Margins of a paper: left, top, right, bottom.
+pub fn margins(paper: Paper) -> [i32; 4] {
+    match table().find(|known| known.name == paper.name()) {
+        Some(known) => known.margins_mm.map(hundredths),
+        None => custom_margins().map(|margin| hundredths(margin.0)),
+    }
+}
+
+/// The smallest and the largest sheet without a name.
+pub fn sizes() -> (Size, Size) {
+    let (least, most) = custom_range();
+    let size = |point: press::layout::Point| (hundredths(point.0.0), hundredths(point.1.0));
+    (size(least), size(most))
+}
+
+/// The paper of a sheet of this size.
+pub fn paper(size: Size) -> Option<Paper> {
+    let mm = |side: i32| f64::from(side) / 100.0;
+    paper_of(mm(size.0), mm(size.1), false).ok()
+}
+
+/// The keyword of a sheet of this size.
+pub fn keyword_of(sheet: Size) -> String {
+    match SHEETS.iter().find(|(_, paper)| size(*paper) == sheet) {
+        Some((keyword, _)) => (*keyword).into(),
+        None => {
+            let mm = |side: i32| {
+                let text = format!("{}.{:02}", side / 100, side % 100);
+                text.trim_end_matches('0').trim_end_matches('.').to_owned()
+            };
+            format!("custom_{0}x{1}mm_{0}x{1}mm", mm(sheet.0), mm(sheet.1))
+        }
+    }
+}
+
+/// The size that a keyword names: one of [`SHEETS`], or the size at its end, such as `na_index-4x6_4x6in`.
+pub fn size_of(keyword: &str) -> Option<Size> {
+    if let Some((_, paper)) = SHEETS.iter().find(|(known, _)| *known == keyword) {
+        return Some(size(*paper));
+    }
+    let last = keyword.rsplit('_').next()?;
+    let (sides, unit) = match (last.strip_suffix("mm"), last.strip_suffix("in")) {
+        (Some(sides), _) => (sides, 1.0),
+        (None, Some(sides)) => (sides, 25.4),
+        (None, None) => return None,
+    };
+    let (width, length) = sides.split_once('x')?;
+    let side = |text: &str| text.parse::<f64>().ok().filter(|side| (0.0..1000.0).contains(side));
+    Some((hundredths(side(width)? * unit), hundredths(side(length)? * unit)))
+}
+
+/// What a job asks for.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct Ticket {
+    /// Sheets of each page.
+    pub copies: u32,
+    /// The sheet.
+    pub size: Option<Size>,
+    /// What it is made of, by its keyword.
+    pub kind: Option<String>,
+    /// `print-quality`.
+    pub quality: Option<i32>,
+    /// `print-content-optimize`.
+    pub content: Option<String>,
+    /// `print-rendering-intent`.
+    pub intent: Option<String>,
+    /// `print-color-mode`.
+    pub colour: Option<String>,
+    /// Pages to print, from 1.
+    pub pages: Vec<(i32, i32)>,
+    /// Whether it waits until it is released.
+    pub held: bool,
+}
+
+impl Default for Ticket {
+    fn default() -> Ticket {
+        Ticket {
+            copies: 1,
+            size: None,
+            kind: None,
+            quality: None,
+            content: None,
+            intent: None,
+            colour: None,
+            pages: Vec::new(),
+            held: false,
+        }
+    }
+}
+
+impl Ticket {
+    /// Takes one attribute of a job; false if it or its value is not possible here.
+    pub fn take(&mut self, name: &str, value: &IppValue) -> bool {
+        let word = || read_text(value);
+        let one_of = |known: &[&str]| read_text(value).filter(|word| known.contains(&word.as_str()));
+        let set = |place: &mut Option<String>, found: Option<String>| {
+            let fits = found.is_some();
+            *place = found.or(place.take());
+            fits
+        };
+        match (name, value) {
+            ("copies", IppValue::Integer(copies)) => match u32::try_from(*copies) {
+                Ok(number @ 1..) if *copies <= MOST_COPIES => {
+                    self.copies = number;
+                    true
+                }
+                _ => false,
+            },
+            ("media", _) => match word().as_deref().and_then(size_of).filter(|&size| paper(size).is_some()) {
+                Some(size) => {
+                    self.size = Some(size);
+                    true
+                }
+                None => false,
+            },
+            ("media-col", IppValue::Collection(members)) => members.iter().all(|(member, value)| {
+                match (member.as_str(), value) {
+                    ("media-size", IppValue::Collection(sides)) => {
+                        let side = |name: &str| {
+                            sides.iter().find_map(|(member, value)| match value {
+                                IppValue::Integer(side) if member.as_str() == name => Some(*side),
+                                _ => None,
+                            })
+                        };
+                        let found = side("x-dimension").zip(side("y-dimension"));
+                        let found = found.filter(|&size| paper(size).is_some());
+                        self.size = found.or(self.size);
+                        found.is_some()
+                    }
+                    ("media-size-name", value) => self.take("media", value),
+                    ("media-type", value) => self.take("media-type", value),
+                    // What the printer itself decides, and what no sheet is told apart by.
+                    _ => true,
+                }
+            }),
+            ("media-type", _) => {
+                let found = one_of(&[&TYPES.map(|row| row.0)[..], &[AUTO]].concat());
+                set(&mut self.kind, found)
+            }
+            ("print-quality", IppValue::Enum(quality)) if QUALITIES.contains(quality) => {
+                self.quality = Some(*quality);
+                true
+            }
+            ("print-content-optimize", _) => {
+                let found = one_of(&CONTENTS.map(|row| row.0));
+                set(&mut self.content, found)
+            }
+            ("print-rendering-intent", _) => {
+                let found = one_of(&INTENTS.map(|row| row.0));
+                set(&mut self.intent, found)
+            }
+            ("print-color-mode", _) => {
+                let found = one_of(&COLOURS);
+                set(&mut self.colour, found)
+            }
+            ("page-ranges", _) => each(value).iter().all(|range| match range {
+                IppValue::RangeOfInteger { min, max } if 1 <= *min && min <= max => {
+                    self.pages.push((*min, *max));
+                    true
+                }
+                _ => false,
+            }),
+            ("job-hold-until", _) => match word().as_deref() {
+                Some("no-hold") => true,
+                Some("indefinite") => {
+                    self.held = true;
+                    true
+                }
+                _ => false,
+            },
+            ("orientation-requested" | "finishings" | "number-up" | "job-priority", value) => {
+                matches!(
+                    (name, value),
+                    ("orientation-requested" | "finishings", IppValue::Enum(3))
+                        | ("number-up", IppValue::Integer(1))
+                ) || matches!((name, value), ("job-priority", IppValue::Integer(1..=100)))
+            }
+            ("printer-resolution", IppValue::Resolution { cross_feed, feed, units: 3 }) => {
+                cross_feed == feed && RESOLUTIONS.iter().any(|&known| i32::from(known) == *feed)
+            }
+            // Of pages by themselves nothing can be asked.
+            ("overrides", _) => false,
+            _ => FIXED.iter().any(|&(known, only)| known == name && word().as_deref() == Some(only)),
+        }
+    }
+
+    /// What a preset's printer draws for this job.
+    pub fn choices(&self, preset: &Choices) -> Choices {
+        let mut choices = preset.clone();
+        if let Some((_, _, media, curl)) = TYPES.into_iter().find(|row| self.kind.as_deref() == Some(row.0)) {
+            (choices.media, choices.curl_correction) = (media, curl);
+        }
+        match self.quality {
+            Some(3) => choices.dpi = 300,
+            Some(5) => choices.halftone = Method::Best,
+            _ => {}
+        }
+        let asked = |table: &[(&str, Option<Intent>)], word: &Option<String>| {
+            table.iter().find(|row| word.as_deref() == Some(row.0)).and_then(|row| row.1)
+        };
+        let intent = asked(&INTENTS, &self.intent).or(asked(&CONTENTS, &self.content));
+        choices.intent = intent.unwrap_or(choices.intent);
+        if self.colour.as_deref() == Some("monochrome") {
+            choices.colours = InkSet::of([Ink::Black]);
+        }
+        let page = |number: i32| usize::try_from(number).unwrap_or(usize::MAX);
+        choices.pages = self.pages.iter().map(|&(from, to)| page(from)..=page(to)).collect();
+        if let Some(paper) = self.size.and_then(paper) {
+            choices.paper = paper;
+        }
+        choices
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::values::{collection, keyword};
+
+    #[test]
+    fn a_sheet_comes_back_from_its_keyword_and_has_the_margins_of_its_own() {
+        for (keyword, paper) in SHEETS {
+            assert_eq!(size_of(keyword).and_then(super::paper), Some(paper));
+            assert_eq!(keyword_of(size(paper)), keyword);
+            // The size in the name is the size of the sheet.
+            let bare = format!("custom_x_{}", keyword.rsplit('_').next().unwrap());
+            let named = size_of(&bare).unwrap();
+            assert!(
+                named.0.abs_diff(size(paper).0) <= 5 && named.1.abs_diff(size(paper).1) <= 5,
+                "{keyword}"
+            );
+        }
+        assert_eq!(margins(Paper::A4), [339, 1202, 341, 1523]);
+        assert!(margins(Paper::Postcard)[1] < 310);
+        let index = size_of("na_index-4x6_4x6in").unwrap();
+        assert_eq!(index, (10160, 15240));
+        assert_eq!(keyword_of(index), "custom_101.6x152.4mm_101.6x152.4mm");
+        assert_eq!(size_of(&keyword_of(index)), Some(index));
+        for wrong in ["", "a4", "x_1e9x2mm", "x_-1x2mm", "x_NaNx2mm"] {
+            assert_eq!(size_of(wrong), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn what_a_dialog_asks_changes_the_preset_and_nothing_else() {
+        let preset = Choices::read(&[("FoilpressWhite".into(), "Under".into())], None).unwrap();
+        let mut ticket = Ticket::default();
+        assert_eq!(ticket.choices(&preset), preset);
+        let size = collection([
+            ("x-dimension", IppValue::Integer(10000)),
+            ("y-dimension", IppValue::Integer(14800)),
+        ]);
+        assert!(
+            ticket.take("media-col", &collection([("media-size", size), ("media-type", keyword("film"))]))
+        );
+        assert!(ticket.take("print-quality", &IppValue::Enum(5)));
+        assert!(ticket.take("print-color-mode", &keyword("monochrome")));
+        assert!(ticket.take("print-content-optimize", &keyword("photo")));
+        assert!(ticket.take("page-ranges", &IppValue::RangeOfInteger { min: 2, max: 3 }));
+        let asked = ticket.choices(&preset);
+        let expected = Choices {
+            media: Media::Plain,
+            curl_correction: false,
+            halftone: Method::Best,
+            colours: InkSet::of([Ink::Black]),
+            intent: Intent::Perceptual,
+            pages: vec![2..=3],
+            paper: Paper::Postcard,
+            ..preset
+        };
+        assert_eq!(asked, expected);
+    }
+
+    #[test]
+    fn what_is_not_possible_is_said_and_changes_nothing() {
+        let mut ticket = Ticket::default();
+        for (name, value) in [
+            ("copies", IppValue::Integer(0)),
+            ("copies", IppValue::Integer(100)),
+            ("copies", keyword("two")),
+            ("media", keyword("iso_a0_841x1189mm")),
+            ("media-type", keyword("gold-leaf")),
+            ("print-quality", IppValue::Enum(9)),
+            ("sides", keyword("two-sided-long-edge")),
+            ("page-ranges", IppValue::RangeOfInteger { min: 3, max: 2 }),
+            ("orientation-requested", IppValue::Enum(4)),
+            ("wallpaper", keyword("yes")),
+        ] {
+            assert!(!ticket.take(name, &value), "{name}");
+        }
+        assert!(ticket.take("sides", &keyword("one-sided")));
+        assert_eq!(ticket, Ticket::default());
+    }
+}

@@ -1,0 +1,56 @@
+//! The server as its clients see it: over a socket.
+
+mod clients;
+mod limits;
+
+use std::net::{SocketAddr, TcpListener};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use inks::Library;
+use observe::Silent;
+use queue::options::Choices;
+use serve::http::{Limits, run};
+use serve::server::{Preset, Server, Settings};
+use tempfile::TempDir;
+
+/// A server in this process, which writes sheets into a folder.
+pub struct Running {
+    /// The server itself.
+    pub server: Arc<Server>,
+    /// Where it listens.
+    pub address: SocketAddr,
+    folder: TempDir,
+}
+
+impl Running {
+    /// With these limits. `prints` says whether anything becomes of jobs.
+    pub fn start(limits: Limits, prints: bool) -> Running {
+        let folder = tempfile::tempdir().unwrap();
+        let choices = Choices::read(&[], None).unwrap();
+        let settings = Settings {
+            to: format!("file:{}", folder.path().join("sheets").display()).parse().unwrap(),
+            printers: vec![Preset { name: "standard".into(), about: "ALPS MD-5500".into(), choices }],
+            folder: folder.path().join("serve"),
+            library: Library::builtin(),
+            devices: device::printers::Printers::at(&folder.path().join("printers")).unwrap(),
+            hosts: vec!["workshop.local".into()],
+            code: "secret".into(),
+        };
+        let server = Arc::new(Server::begin(settings, Box::new(Silent)).unwrap());
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap();
+        let serving = server.clone();
+        std::thread::spawn(move || run(&serving, vec![listener], limits).unwrap());
+        if prints {
+            let printing = server.clone();
+            std::thread::spawn(move || serve::worker::work(&printing));
+        }
+        Running { server, address, folder }
+    }
+
+    /// A place in the folder of this server.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+}

@@ -1,0 +1,245 @@
+//! `foilpress serve`: a printer for every device of the house.
+//!
+//! The server itself is behind the feature `serve`, for its libraries are many, and whoever builds this program to print one file needs
+//! none of them. The command line is the same without it.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args as ClapArgs;
+
+use device::connection::Destination;
+
+/// Arguments of `serve`.
+#[derive(ClapArgs, Debug)]
+#[command(after_help = "Examples:\n  \
+    foilpress serve --to usb:                              (for this computer: http://localhost:8631/)\n  \
+    foilpress serve --to usb: --share                      (for every device of the house)\n  \
+    foilpress serve --to file:sheets                       (keeps each sheet as a file in the folder sheets)\n  \
+    sudo foilpress serve --to usb: --install               (from now on, at every start of this computer)\n\n\
+    Each preset that fits `foilpress layers` is a printer of its own, at ipp://HOST:8631/ipp/print/PRESET. The printer `standard` \
+    is always there. Stop the server with Ctrl-C: jobs are kept, and continue when it starts again.")]
+pub struct Args {
+    /// Destination: usb:, serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE, or file:FOLDER
+    #[arg(long, value_name = "WHERE", value_parser = destination, required_unless_present = "uninstall")]
+    pub to: Option<(String, Destination)>,
+    /// Address and port to listen on
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8631")]
+    pub listen: SocketAddr,
+    /// Listen on all addresses of this computer, so that other devices can print
+    ///
+    /// Everyone who reaches this computer can print then. To change the loaded sheet, or to cancel a job, other devices
+    /// need the code that is shown in the terminal.
+    #[arg(long)]
+    pub share: bool,
+    /// Install the server as a service of the system that is found by print dialogs, with your presets (as root)
+    ///
+    /// Writes a systemd unit, and a service file of Avahi for each printer. Install again after a change of presets.
+    #[arg(long, conflicts_with_all = ["jobs", "library", "share"])]
+    pub install: bool,
+    /// Remove the service with everything it has kept (as root)
+    #[arg(long, conflicts_with_all = ["install", "to", "listen", "share", "jobs", "library"])]
+    pub uninstall: bool,
+    /// Folder of the jobs [default: serve/ beside the jobs of `send`]
+    #[arg(long, value_name = "DIR")]
+    pub jobs: Option<PathBuf>,
+    /// Your own ink library: its folder, or the name it was added under [default: the built-in library]
+    #[arg(long, value_name = "LIBRARY")]
+    pub library: Option<PathBuf>,
+}
+
+fn destination(text: &str) -> Result<(String, Destination), device::connection::NoDestination> {
+    Ok((text.to_owned(), text.parse()?))
+}
+
+/// Runs `serve`.
+#[cfg(not(feature = "serve"))]
+pub fn run(_args: &Args, _program: &clap::Command) -> Result<()> {
+    anyhow::bail!(
+        "this program was built without the print server; packages have it, and so does `cargo run --release --features serve -- serve`"
+    )
+}
+
+#[cfg(feature = "serve")]
+pub use with_server::run;
+
+#[cfg(feature = "serve")]
+mod with_server {
+    use std::net::{Ipv6Addr, TcpListener};
+    use std::sync::Arc;
+
+    use anyhow::{Context as _, bail};
+    use clap::FromArgMatches as _;
+    use serve::http::{self, Limits};
+    use serve::install::{Places, Service, UNIT};
+    use serve::server::{Preset, Server, Settings, identities};
+    use serve::worker;
+
+    use super::*;
+    use crate::cli::commands::{Command, preset};
+    use crate::cli::console::{say, show};
+    use device::printers::Printers;
+    use device::transit::journal::Journal;
+    use observe::{Observer, Silent};
+
+    /// The printer that is always there.
+    const STANDARD: &str = "standard";
+    /// Letters of a code, without those that look alike.
+    const LETTERS: &[u8; 32] = b"abcdefghijkmnpqrstuvwxyz23456789";
+    /// Letters of a code: 2^40 of them are not tried out over a network.
+    const CODE: usize = 8;
+
+    /// What the server says, at the terminal.
+    struct Terminal;
+
+    impl Observer for Terminal {
+        fn begin(&self, _: &str, _: u64) {}
+        fn advance(&self, _: u64) {}
+        fn end(&self) {}
+        fn note(&self, text: &str) {
+            say(&format!("note: {text}"));
+        }
+    }
+
+    /// Runs `serve` until the process is ended.
+    pub fn run(args: &Args, program: &clap::Command) -> Result<()> {
+        let (typed, to) = match &args.to {
+            _ if args.uninstall => return uninstall(),
+            Some(to) => to.clone(),
+            None => bail!("--to says where sheets go, such as --to usb:"),
+        };
+        if args.install {
+            return install(&typed, args.listen.port(), program);
+        }
+        let folder = match &args.jobs {
+            Some(folder) => folder.clone(),
+            None => Journal::of_user()?.folder().join("serve"),
+        };
+        let listen = match args.share {
+            true => SocketAddr::from((Ipv6Addr::UNSPECIFIED, args.listen.port())),
+            false => args.listen,
+        };
+        let listener = TcpListener::bind(listen).with_context(|| {
+            format!("cannot listen on {listen}; is another server there? --listen chooses another port")
+        })?;
+        let address = listener.local_addr()?;
+        let settings = Settings {
+            to,
+            printers: printers(program)?,
+            folder,
+            library: crate::libraries::given(args.library.as_deref())?,
+            devices: Printers::of_system()?,
+            hosts: hosts(),
+            code: code()?,
+        };
+        let host = match address.ip().is_unspecified() {
+            true => settings.hosts.first().map_or("localhost", String::as_str).to_owned(),
+            false => address.ip().to_string(),
+        };
+        let host = if host.contains(':') { format!("[{host}]") } else { host };
+        let port = address.port();
+        let mut text = String::new();
+        for printer in &settings.printers {
+            text.push_str(&format!("ipp://{host}:{port}/ipp/print/{}  {}\n", printer.name, printer.about));
+        }
+        text.push_str(&format!(
+            "http://{host}:{port}/  the desk: jobs, the loaded sheet, printing from a browser\n"
+        ));
+        if !address.ip().is_loopback() {
+            text.push_str(&format!("code for changes from other devices: {}\n", settings.code));
+        }
+        let server = Arc::new(Server::begin(settings, Box::new(Terminal))?);
+        let printing = server.clone();
+        std::thread::Builder::new().name("printing".into()).spawn(move || worker::work(&printing))?;
+        show(&text)?;
+        Ok(http::run(&server, vec![listener], Limits::default())?)
+    }
+
+    /// Tells the system about the service.
+    fn systemctl(arguments: &[&str]) -> Result<()> {
+        let done = std::process::Command::new("systemctl").args(arguments).status();
+        match done.context("cannot start systemctl; the files are there, but this system has no systemd")? {
+            status if status.success() => Ok(()),
+            status => bail!("systemctl {}: {status}", arguments.join(" ")),
+        }
+    }
+
+    const AS_ROOT: &str = "only root may change services; run the same command with sudo";
+
+    fn install(to: &str, port: u16, program: &clap::Command) -> Result<()> {
+        let places = Places::at(std::path::Path::new("/"));
+        let printers = printers(program)?;
+        let names: Vec<String> = printers.iter().map(|printer| printer.name.clone()).collect();
+        let uuids = identities(&places.state(), &names).context(AS_ROOT)?;
+        let printers: Vec<(Preset, String)> = printers.into_iter().zip(uuids).collect();
+        let own = std::env::current_exe().context("cannot find this program's own file")?;
+        let presets = crate::folders::config()?.join("presets");
+        let service = Service { program: &own, to, port, printers: &printers, presets: &presets };
+        let written = places.install(&service).context(AS_ROOT)?;
+        let list: String = written.iter().map(|path| format!("{}\n", path.display())).collect();
+        show(&list)?;
+        systemctl(&["daemon-reload"])?;
+        systemctl(&["enable", "--now", UNIT])
+    }
+
+    fn uninstall() -> Result<()> {
+        // A service that is not there need not be stopped.
+        let stopped = systemctl(&["disable", "--now", UNIT]);
+        Places::at(std::path::Path::new("/")).uninstall().context(AS_ROOT)?;
+        show("the service is removed, with its jobs\n")?;
+        match stopped {
+            Ok(()) => systemctl(&["daemon-reload"]),
+            Err(_) => Ok(()),
+        }
+    }
+
+    /// The printer without options, and one for each preset that fits.
+    fn printers(program: &clap::Command) -> Result<Vec<Preset>> {
+        let mut printers = vec![of_words(STANDARD, &[], program)?];
+        for (name, words) in preset::all()? {
+            if name == STANDARD {
+                bail!(
+                    "the preset `{STANDARD}` has the name of the printer without options; save it under another one"
+                );
+            }
+            match of_words(&name, &words, program) {
+                Ok(printer) => printers.push(printer),
+                Err(_) => say(&format!(
+                    "note: the preset `{name}` does not fit `foilpress layers`, so it is no printer"
+                )),
+            }
+        }
+        Ok(printers)
+    }
+
+    fn of_words(name: &str, words: &[String], program: &clap::Command) -> Result<Preset> {
+        let typed = ["foilpress", "layers", "art"].into_iter().chain(words.iter().map(String::as_str));
+        let matches = program.clone().try_get_matches_from(typed)?;
+        let args = crate::cli::Args::from_arg_matches(&matches)?;
+        let Command::Layers(layers) = args.command else { bail!("no preset of `foilpress layers`") };
+        let about = match words {
+            [] => "ALPS MD-5500".into(),
+            words => format!("ALPS MD-5500, {}", words.join(" ")),
+        };
+        Ok(Preset { name: name.into(), about, choices: layers.choices(&Silent)? })
+    }
+
+    /// The names under which this computer may be asked for.
+    fn hosts() -> Vec<String> {
+        let name = std::fs::read_to_string("/proc/sys/kernel/hostname")
+            .ok()
+            .or_else(|| std::env::var("COMPUTERNAME").ok())
+            .or_else(|| std::env::var("HOSTNAME").ok());
+        let name = name.map(|name| name.trim().to_owned()).filter(|name| !name.is_empty());
+        let Some(name) = name else { return Vec::new() };
+        let short = name.split('.').next().unwrap_or(&name).to_owned();
+        vec![format!("{short}.local"), name, short]
+    }
+
+    fn code() -> Result<String> {
+        let mut bytes = [0; CODE];
+        serve::random(&mut bytes)?;
+        Ok(bytes.iter().map(|byte| char::from(LETTERS[usize::from(byte % 32)])).collect())
+    }
+}
