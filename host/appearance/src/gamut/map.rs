@@ -116,11 +116,12 @@ pub fn gain(
     let targets = Targets { rows: rows.collect::<Result<_, _>>()?, importance: judged.importance.clone() };
     let best =
         cartridges::choose(&all, &targets, settings.most_cartridges, Precision::PRINT, &observe::Silent)?;
+    let (best, _) = cartridges::needed(&all, &targets, best)?;
     let used = InkSet::of(best.stacks.iter().flat_map(|&k| all.inks[k].iter()));
     let known = InkSet::of(at_hand.stacks.iter().flat_map(|stack| stack.layers().iter().copied()));
     let inks = used.iter().filter(|&ink| !known.contains(ink)).collect();
     let gain = Gain { before: judged.distance, after: best.chosen, inks };
-    Ok((gain.after < gain.before && !gain.inks.is_empty()).then_some(gain))
+    Ok((!cartridges::is_as_good(gain.before, gain.after) && !gain.inks.is_empty()).then_some(gain))
 }
 
 /// The best cartridges for a document: root mean square distances of a sample of its pixels, in the metric of the settings.
@@ -154,6 +155,7 @@ pub fn choose(
     let (targets, _) = document.targets(None)?;
     let all = &document.all;
     let best = cartridges::choose(all, &targets, settings.most_cartridges, Precision::EXACT, observer)?;
+    let (best, _) = cartridges::needed(all, &targets, best)?;
     Ok(Choice {
         chosen: cartridges::worth(all, &targets, &best)?,
         given_up: best.given_up,
@@ -229,6 +231,10 @@ impl<'a> Pixels<'a> {
     fn cartridges(&self, targets: &Targets, observer: &dyn Observer) -> Result<Cartridges, GamutError> {
         let most = self.settings.most_cartridges;
         let cartridges = cartridges::choose(&self.all, targets, most, Precision::PRINT, observer)?;
+        let (cartridges, spared) = cartridges::needed(&self.all, targets, cartridges)?;
+        if let Some(words) = spared_in_words(&spared, self.settings) {
+            observer.note(&words);
+        }
         if let Some(words) = in_words(&cartridges, self.settings) {
             observer.note(&words);
         }
@@ -495,6 +501,19 @@ fn in_target(what: impl Into<String>) -> impl FnOnce(MixtureError) -> GamutError
 }
 
 /// A sentence that names the inks that were left out and what that costs.
+/// Which cartridges were left out because they bring nothing that is seen.
+fn spared_in_words(spared: &[GivenUp], settings: &GamutSettings) -> Option<String> {
+    let (first, last) = (spared.first()?, spared.last()?);
+    let names: Vec<&str> = spared.iter().map(|spared| spared.ink.name()).collect();
+    Some(format!(
+        "left out, because nobody would see what they bring: {} (the root mean square difference{} changes from {:.4} to {:.4})",
+        names.join(", "),
+        settings.measure(),
+        first.with,
+        last.without
+    ))
+}
+
 fn in_words(cartridges: &Cartridges, settings: &GamutSettings) -> Option<String> {
     let names: Vec<&str> = cartridges.given_up.iter().map(|given_up| given_up.ink.name()).collect();
     let listed = match names.split_last()? {

@@ -158,7 +158,7 @@ proptest! {
             bases.push(&row);
         }
         let document = Factored { space: space.clone(), bases, maps: pattern(6, 5) };
-        // All inks, so that none must be given up.
+        // All inks, so that none must be given up for another.
         let settings = GamutSettings { most_cartridges: 13, ..basis_settings() };
         let mapped = map(&document, None, &printable, &settings, &Silent).unwrap();
         is_printable(&mapped.mix, 13);
@@ -167,8 +167,8 @@ proptest! {
             document.reflectance(pixel, &mut target);
             let target: Vec<f64> = target.iter().map(|&f| f64::from(f)).collect();
             let d = space.distance(&target, &printed_row(&mapped.mix, &printable, pixel));
-            // Shares are rounded to 1/32768.
-            prop_assert!(d < 3e-4, "pixel {pixel}: {d}");
+            // Cartridges that bring less than 5e-5 on average are left out; shares are rounded to 1/32768.
+            prop_assert!(d < 1e-3, "pixel {pixel}: {d}");
         }
     }
 }
@@ -442,19 +442,32 @@ fn every_clamped_pixel_is_its_own_best() {
     let settings = GamutSettings { intent: Intent::Clamp, most_cartridges: 13, ..GamutSettings::default() };
     let mapped = map(&document, Some(&pixels), &printable, &settings, &Silent).unwrap();
     is_printable(&mapped.mix, 13);
-    let hull = crate::solve::Hull::new(&space, &printable.curves, &[0.0; 57], LIGHT).unwrap();
+    let hull =
+        |curves: &Table| crate::solve::Hull::new(&space, curves, &vec![0.0; curves.len()], LIGHT).unwrap();
+    let mut used = Table::new(space.columns());
+    for stack in &mapped.mix.stacks {
+        let k = printable.stacks.iter().position(|other| other == stack).unwrap();
+        used.push(printable.curves.row(k));
+    }
+    let (all, used) = (hull(&printable.curves), hull(&used));
     let mut mixer = crate::solve::Mixer::new();
     let mut row = vec![0f32; space.columns()];
+    let (mut with_all, mut with_used) = (0.0, 0.0);
     for pixel in (0..380).step_by(3) {
         pixels.reflectance(pixel, &mut row);
         let target: Vec<f64> = row.iter().map(|&f| f64::from(f)).collect();
-        let best = mixer.best(&hull, &hull.target(&target).unwrap()).unwrap().fit.distance;
+        with_all += mixer.best(&all, &all.target(&target).unwrap()).unwrap().fit.distance.powi(2);
+        let best = mixer.best(&used, &used.target(&target).unwrap()).unwrap().fit.distance;
         let printed = printed_row(&mapped.mix, &printable, pixel);
         let light = LIGHT * space.light_distance(&target, &printed);
         let d = space.distance(&target, &printed).hypot(light);
         // Price of layers, pruning and rounding of shares.
         assert!(d >= best - 1e-9 && d < best + 5e-4, "pixel {pixel}: {d} {best}");
+        with_used += best.powi(2);
     }
+    // Cartridges and stacks that bring less than 1 % each were left out.
+    let (with_all, with_used) = (with_all.sqrt(), with_used.sqrt());
+    assert!(with_used >= with_all - 1e-9 && with_used < 1.03 * with_all, "{with_used} {with_all}");
     let report = mapped.report.pixels.unwrap();
     assert!(report.gap <= 1e-7 && report.rms <= report.max && report.p95 <= report.max, "{report:?}");
 }
@@ -494,7 +507,8 @@ fn blending_follows_the_clamped_mix_inside_the_gamut() {
     assert!(blended.report.pixels.unwrap().clamped > 0.999);
     let d = space
         .distance(&printed_row(&clamped.mix, &printable, 99), &printed_row(&blended.mix, &printable, 99));
-    assert!(d < 1e-3, "{d}");
+    // Each has cartridges and stacks of its own, without those that bring less than is seen.
+    assert!(d < 2e-3, "{d}");
 }
 
 #[test]

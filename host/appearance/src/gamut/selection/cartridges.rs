@@ -82,6 +82,62 @@ pub(crate) fn choose(
     Ok(Cartridges { stacks: stacks_of(candidates, inks), inks, given_up, all, chosen })
 }
 
+/// The part of a distance that is not worth a cartridge.
+const SPARED: f64 = 0.01;
+/// What reports show as 0.0000.
+const SHOWN: f64 = 5e-5;
+
+/// Whether a distance is no worse than another for what is seen: within 1 % of it, or shown as equal.
+pub(crate) fn is_as_good(without: f64, with: f64) -> bool {
+    without <= with + (SPARED * with).max(SHOWN)
+}
+
+/// The cartridges without those that bring nothing, one after another, the cheapest first: in the end none is left whose removal
+/// keeps the distance [as good](is_as_good). Returns those left out, too, each with the distances around its removal.
+pub(crate) fn needed(
+    candidates: &Candidates,
+    targets: &Targets,
+    mut cartridges: Cartridges,
+) -> Result<(Cartridges, Vec<GivenUp>), GamutError> {
+    let failed = |source| GamutError::Mixture { what: "leaving out a cartridge".into(), source };
+    let mut spared = Vec::new();
+    let mut fitted = targets.fit(candidates, &cartridges.stacks, None).map_err(failed)?;
+    loop {
+        let mut cheapest: Option<(Ink, Vec<usize>, Fitted)> = None;
+        for ink in cartridges.inks.iter() {
+            let stacks = stacks_of(candidates, cartridges.inks.without(ink));
+            if stacks.is_empty() {
+                continue;
+            }
+            let less = targets.fit(candidates, &stacks, Some(&fitted)).map_err(failed)?;
+            if cheapest.as_ref().is_none_or(|(.., best)| less.loss < best.loss) {
+                cheapest = Some((ink, stacks, less));
+            }
+        }
+        let with = fitted.loss.sqrt();
+        let Some((ink, stacks, less)) = cheapest.filter(|(.., less)| is_as_good(less.loss.sqrt(), with))
+        else {
+            break;
+        };
+        let without = less.loss.sqrt();
+        spared.push(GivenUp { ink, with, without });
+        cartridges.inks = cartridges.inks.without(ink);
+        (cartridges.stacks, cartridges.chosen, fitted) = (stacks, without, less);
+    }
+    // Of the others only those that would be seen, beside the ones that are left.
+    let mut given_up = Vec::new();
+    for GivenUp { ink, .. } in std::mem::take(&mut cartridges.given_up) {
+        let stacks = stacks_of(candidates, cartridges.inks.with(ink));
+        let with = targets.fit(candidates, &stacks, None).map_err(failed)?.loss.sqrt();
+        if !is_as_good(cartridges.chosen, with) {
+            given_up.push(GivenUp { ink, with, without: cartridges.chosen });
+        }
+    }
+    given_up.sort_by(|a, b| a.with.total_cmp(&b.with));
+    cartridges.given_up = given_up;
+    Ok((cartridges, spared))
+}
+
 /// What each of the chosen cartridges is worth: the distance without it, with the other ones. The one that is missed most
 /// comes first.
 pub(crate) fn worth(
@@ -196,6 +252,15 @@ mod tests {
             // Neither counts where it has to be exact: the solver's gap alone is left.
             let exact = choose(&candidates, &targets, 3, Precision::EXACT, &Silent).unwrap();
             prop_assert!((exact.chosen.powi(2) - best).abs() <= 3e-8, "{} {}", exact.chosen, best.sqrt());
+            // Every set without one of those that are needed is worse to see, fitted from nothing.
+            let (needed, spared) = needed(&candidates, &targets, choose(&candidates, &targets, 3, Precision::EXACT, &Silent).unwrap()).unwrap();
+            prop_assert_eq!(needed.inks.len() + spared.len(), exact.inks.len());
+            for ink in needed.inks.iter() {
+                let stacks = stacks_of(&candidates, needed.inks.without(ink));
+                let without = targets.fit(&candidates, &stacks, None).unwrap().loss.sqrt();
+                // The solver's gap beside the limit.
+                prop_assert!(without > needed.chosen + (0.0099 * needed.chosen).max(4.9e-5) - 1e-6, "{ink:?} {without}");
+            }
             for left in worth(&candidates, &targets, &exact).unwrap() {
                 let fewer = stacks_of(&candidates, exact.inks.without(left.ink));
                 let again = targets.fit(&candidates, &fewer, None).unwrap().loss;
@@ -203,5 +268,30 @@ mod tests {
                 prop_assert!(left.without.powi(2) >= exact.chosen.powi(2) - 3e-8, "{left:?}");
             }
         }
+    }
+
+    /// A paper, a grey that two inks print all but alike, and a target between: one of the inks is enough.
+    #[test]
+    fn a_cartridge_that_brings_nothing_is_left_out() {
+        use crate::brdf::Table;
+        let space = Space::half_angle(8);
+        let stacks: Vec<inks::Stack> = ["substrate", "K", "C"].map(|s| s.parse().unwrap()).to_vec();
+        let used = |level: f64| {
+            let mut curves = Table::new(space.columns());
+            for level in [0.27, 0.02, level] {
+                curves.push(&vec![level; space.columns()]);
+            }
+            let candidates = Candidates::new(&space, &Printable::new(stacks.clone(), curves), 0.0).unwrap();
+            // Darker than either ink.
+            let row = candidates.free.target(&vec![0.01; space.columns()]).unwrap();
+            let targets = Targets { rows: vec![row.clone(), row], importance: vec![1.0, 1.0] };
+            let all = choose(&candidates, &targets, 7, Precision::EXACT, &Silent).unwrap();
+            let (inks, (needed, spared)) = (all.inks, needed(&candidates, &targets, all).unwrap());
+            assert_eq!(spared.len(), inks.len() - needed.inks.len());
+            needed.inks.iter().map(Ink::name).collect::<Vec<_>>()
+        };
+        // The darkest that there is, whichever it is, and nothing beside it.
+        assert_eq!(used(0.0201), ["black"]);
+        assert_eq!(used(0.0199), ["cyan"]);
     }
 }
