@@ -417,6 +417,23 @@ proptest! {
     }
 }
 
+/// The dove's bases of SACLS have holes where their highlights are; the leaf's are near its materials.
+#[test]
+fn bases_far_from_the_document_give_way_to_means_of_its_materials() {
+    let sampled = |name: &str, bases| {
+        let document =
+            crate::document::open(&format!("sample:{name}"), &Default::default(), &Silent).unwrap();
+        let settings =
+            FactorSettings { method: Method::Sacls, bases: Some(bases), ..FactorSettings::default() };
+        factor(document.materials(), &settings, &Silent).unwrap().report
+    };
+    let dove = sampled("dove", 3);
+    assert_eq!(dove.method, Method::Kmeans);
+    assert!(dove.excursion.iter().all(|&e| e < 1e-3), "{:?}", dove.excursion);
+    let leaf = sampled("leaf", 3);
+    assert_eq!(leaf.method, Method::Sacls, "{:?}", leaf.excursion);
+}
+
 /// The comparison behind the default method, on a real document with many materials.
 #[test]
 fn on_real_materials_the_methods_rank_as_documented() {
@@ -424,10 +441,10 @@ fn on_real_materials_the_methods_rank_as_documented() {
     let [archetypes, kmeans, sacls] = METHODS.map(|method| run(&document, method, 6).report);
     let out = |report: &FactorReport| report.excursion.iter().sum::<f64>() / report.bases as f64;
     assert!(archetypes.rmse < 0.8 * kmeans.rmse, "{} {}", archetypes.rmse, kmeans.rmse);
-    assert!(sacls.rmse < 0.8 * kmeans.rmse, "{} {}", sacls.rmse, kmeans.rmse);
     assert!(out(&kmeans) < 1e-3, "means of real materials are inside: {:?}", kmeans.excursion);
     assert!(archetypes.excursion.iter().all(|&e| e < 0.0501), "{:?}", archetypes.excursion);
-    assert!(out(&sacls) > 2.0 * out(&archetypes), "{:?} {:?}", sacls.excursion, archetypes.excursion);
+    // Here the bases of SACLS leave the hull by far, and those of convex k-means take their place.
+    assert_eq!((sacls.method, sacls.rmse), (Method::Kmeans, kmeans.rmse));
 }
 
 #[test]

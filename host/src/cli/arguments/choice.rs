@@ -73,7 +73,7 @@ impl Choice for Method {
         (
             Method::Sacls,
             "sacls",
-            "The paper's sparse alternating constrained least squares: bases may be far from any real material",
+            "The paper's sparse alternating constrained least squares; kmeans where its bases are far from any real material",
         ),
     ];
 }
