@@ -47,7 +47,7 @@ impl Tangent {
                 })
                 .collect()
         };
-        Tangent::reduce(&table.rows().map(scaled).collect::<Vec<_>>())
+        Tangent::reduce(&table.rows().map(scaled).collect::<Vec<_>>(), shares)
     }
 
     /// About the mean mixture of a page; the rows of `table` are the reflectances of its stacks.
@@ -71,36 +71,51 @@ impl Tangent {
         }
     }
 
-    /// The same distances in fewer coordinates: Cholesky factors of the Gram matrix of differences to the first.
-    fn reduce(rows: &[Vec<f64>]) -> Tangent {
-        let difference =
-            |q: usize| -> Vec<f64> { rows[q].iter().zip(&rows[0]).map(|(a, b)| a - b).collect() };
-        let differences: Vec<Vec<f64>> = (0..rows.len()).map(difference).collect();
+    /// The same distances in fewer coordinates, those first in which the mixture's dots differ most: each coordinate points to
+    /// the stack whose direction from the mixture takes up most of what is left of the variance, each stack counted by its
+    /// share. A stack in rare use is far from the others, but its dots are few.
+    fn reduce(rows: &[Vec<f64>], shares: &[f64]) -> Tangent {
+        let mut mean = vec![0.0; rows.first().map_or(0, Vec::len)];
+        for (row, share) in rows.iter().zip(shares) {
+            mean.iter_mut().zip(row).for_each(|(mean, v)| *mean += share * v);
+        }
+        let mut rest: Vec<Vec<f64>> =
+            rows.iter().map(|row| row.iter().zip(&mean).map(|(v, mean)| v - mean).collect()).collect();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let length = |rest: &[Vec<f64>], q: usize| dot(&rest[q], &rest[q]);
+        let longest = |rest: &[Vec<f64>]| (0..rows.len()).map(|q| length(rest, q)).fold(0.0, f64::max);
+        let scale = longest(&rest);
         let mut points: Vec<Vec<f64>> = vec![Vec::new(); rows.len()];
-        let mut rest: Vec<f64> = differences.iter().map(|d| d.iter().map(|v| v * v).sum()).collect();
-        let scale = rest.iter().copied().fold(0.0, f64::max);
-        for _ in 1..rows.len() {
-            let pivot = (0..rows.len()).max_by(|&a, &b| rest[a].total_cmp(&rest[b])).unwrap_or(0);
-            if rest[pivot] <= 1e-9 * scale {
+        for _ in 0..rows.len() {
+            let least = 1e-9 * scale;
+            // What the direction to a stack takes up, and its length, which decides where no stack in use is left.
+            let taken = |q: usize| {
+                let own = length(&rest, q);
+                let sum = |(row, share): (&Vec<f64>, &f64)| share * dot(row, &rest[q]).powi(2);
+                let all: f64 = rest.iter().zip(shares).map(sum).sum();
+                if own > least { (all / own, own) } else { (0.0, 0.0) }
+            };
+            let far = (0..rows.len()).map(|q| (taken(q), q));
+            let Some(((_, own), pivot)) = far.max_by(|(a, _), (b, _)| {
+                let (a_taken, b_taken) = (a.0.max(least), b.0.max(least));
+                a_taken.total_cmp(&b_taken).then(a.1.total_cmp(&b.1))
+            }) else {
+                break;
+            };
+            if own <= least {
                 break;
             }
-            let root = rest[pivot].sqrt();
-            let column: Vec<f64> = (0..rows.len())
-                .map(|q| {
-                    let dot: f64 = differences[q].iter().zip(&differences[pivot]).map(|(a, b)| a * b).sum();
-                    let known: f64 = points[q].iter().zip(&points[pivot]).map(|(a, b)| a * b).sum();
-                    (dot - known) / root
-                })
-                .collect();
-            for (q, value) in column.into_iter().enumerate() {
-                points[q].push(value);
-                rest[q] -= value * value;
+            let direction: Vec<f64> = rest[pivot].iter().map(|v| v / own.sqrt()).collect();
+            for (point, row) in points.iter_mut().zip(&mut rest) {
+                let along = dot(row, &direction);
+                point.push(along);
+                row.iter_mut().zip(&direction).for_each(|(v, d)| *v -= along * d);
             }
         }
         Tangent { points }
     }
 
-    /// The four coordinates in which stacks differ most, to 1/65536, so that the last bit of a power or a root, which differs
+    /// The four coordinates in which the mixture's dots differ most, to 1/65536, so that the last bit of a power or a root, which differs
     /// from machine to machine, changes no dot.
     pub fn leading(&self) -> Vec<[f32; 4]> {
         let round = |value: &f64| ((value * 65536.0).round() / 65536.0) as f32;
@@ -286,6 +301,29 @@ mod tests {
         let (rows, columns) = swing(width, &scattered, 1, 1);
         assert!((0.8..1.25).contains(&rows) && (0.8..1.25).contains(&columns), "{rows} {columns}");
         assert!(swing(width, &lattice, 1, 4).0 > 3.0);
+    }
+
+    /// Six stacks in use, and three far away whose shares are 1 %: four coordinates keep the distances between those in use.
+    #[test]
+    fn rare_stacks_take_no_coordinate_from_the_others() {
+        let axis = |c: usize, length: f64| -> Vec<f64> {
+            (0..7).map(|i| if i == c { length } else { 0.0 }).collect()
+        };
+        let mut rows: Vec<Vec<f64>> = (0..4).map(|c| axis(c, 1.0)).collect();
+        rows.extend((4..7).map(|c| axis(c, 3.0)));
+        let shares = [0.24, 0.25, 0.23, 0.25, 0.01, 0.01, 0.01];
+        let tangent = Tangent::reduce(&rows, &shares);
+        let leading = tangent.leading();
+        for a in 0..4 {
+            for b in 0..a {
+                let kept: f32 = (0..4).map(|c| (leading[a][c] - leading[b][c]).powi(2)).sum();
+                // Three of the four directions between those in use, and the largest of the rare ones.
+                assert!(kept > 0.9 * 2.0, "{a} {b}: {kept}");
+                let all = (0..tangent.points[a].len())
+                    .map(|c| (tangent.points[a][c] - tangent.points[b][c]).powi(2));
+                assert!((all.sum::<f64>() - 2.0).abs() < 1e-9);
+            }
+        }
     }
 
     /// Distances between stacks are the metric's, to first order.
