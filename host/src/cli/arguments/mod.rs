@@ -22,7 +22,7 @@ use observe::Observer;
 /// What to read.
 #[derive(Args, Debug)]
 pub struct DocumentArgs {
-    /// Document: a folder of texture maps, a .gltf or .glb file, a measured BRDF (.binary, .bsdf, .brdf, .csv), a
+    /// Document: a folder of texture maps or its .zip, a .gltf, .glb or .mtlx file, a measured BRDF (.binary, .bsdf, .brdf, .csv), a
     /// .foil folder, or sample:NAME
     #[arg(value_name = "DOC", value_parser = utf8())]
     pub document: String,
