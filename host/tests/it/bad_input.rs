@@ -188,12 +188,15 @@ fn a_number_that_is_none_is_named_with_its_pixel() {
 }
 
 #[test]
-fn a_picture_of_a_kind_that_is_not_read_is_mentioned() {
+fn a_map_of_a_kind_that_is_not_read_is_refused() {
     let bench = Bench::new();
     small_document(&bench.path("tile"));
-    fs::rename(bench.path("tile/base_color.png"), bench.path("tile/base_color.tga")).unwrap();
+    fs::rename(bench.path("tile/base_color.png"), bench.path("tile/base_color.dds")).unwrap();
     let said = bench.refused(1, &format!("print tile {SMALL}"));
-    assert!(said.contains("not read: base_color.tga") && said.contains("PNG"), "{said}");
+    assert!(
+        said.contains("base_color.dds is the base colour map by its name") && said.contains("PNG"),
+        "{said}"
+    );
 }
 
 #[test]
