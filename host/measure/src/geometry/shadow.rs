@@ -15,12 +15,14 @@ use crate::linalg::median;
 /// Cosines of incidence that are dark under a small lamp; of these the darkest part counts, which is so under wider ones too.
 const DARK: (f64, f64) = (-0.5, -0.05);
 const DARKEST: f64 = 0.3;
-/// Those just beyond the edge of a point lamp's light, farther than tape and pixels err (1.4 degrees).
-const BEYOND: (f64, f64) = (-0.04, -0.025);
+/// Those just beyond the edge of a point lamp's light, farther than tape and pixels err (a degree).
+const BEYOND: (f64, f64) = (-0.06, -0.02);
 /// Those from which the slope of the lit side comes.
 const LIT: (f64, f64) = (0.1, 0.25);
 /// Cosines to the camera below this are too near the outline.
 const OUTLINE: f64 = 0.12;
+/// The blur in pixels from which the edge says nothing of the lamp.
+const SHARP: f64 = 0.5;
 /// Pixels that tell a level.
 const FEWEST: usize = 40;
 /// The largest lamp that is looked for, as the sine of its half angle.
@@ -63,10 +65,11 @@ pub(crate) fn look(scene: &Scene, radiance: &Radiance, scale: [f64; 3], light: u
         |part: &[(f64, [f64; 3])], c: usize| median(&mut part.iter().map(|p| p.1[c]).collect::<Vec<_>>());
     let level = std::array::from_fn(|c| middle(&dark, c).max(0.0));
     let mut lamp_mm = 0.0;
-    if beyond.len() >= FEWEST && lit.len() >= FEWEST {
+    // A lens that blurs carries light over the edge as well.
+    if scene.blur() < SHARP && beyond.len() >= FEWEST && lit.len() >= FEWEST {
         let mut slopes: Vec<f64> = lit.iter().map(|(cos, value)| (value[1] - level[1]) / cos).collect();
         let seen = (middle(&beyond, 1) - level[1]) / median(&mut slopes).max(1e-30);
-        let edge = 0.5 * (BEYOND.0 + BEYOND.1);
+        let edge = median(&mut beyond.iter().map(|p| p.0).collect::<Vec<_>>());
         // The least disc that sends so much there.
         let step = |k: i32| WIDEST * f64::from(k) / 100.0;
         let sine = (1..=100).map(step).find(|sine| of_disc(edge, *sine) >= seen).unwrap_or(WIDEST);

@@ -179,6 +179,9 @@ impl Random {
     }
 }
 
+/// The light of a place with this normal, and a reflectance for each half angle.
+type Shade<'a> = &'a dyn Fn(V, V, &dyn Fn(f64) -> V) -> V;
+
 /// Light on a picture, three numbers a pixel.
 type Light = Vec<V>;
 
@@ -220,7 +223,7 @@ impl Studio {
         if self.table <= 0.0 {
             return Vec::new();
         }
-        let (count, half, y) = (14, 420.0, -0.5 * HEIGHT - 25.0);
+        let (count, half, y) = (7, 420.0, -0.5 * HEIGHT - 25.0);
         let size = 2.0 * half / f64::from(count);
         (0..count * count)
             .filter_map(|i| {
@@ -303,7 +306,7 @@ impl Studio {
     }
 
     /// What is in a direction.
-    fn along(&self, d: V, shade: &dyn Fn(V, V, &dyn Fn(f64) -> V) -> V, f: &dyn Fn(f64) -> V) -> V {
+    fn along(&self, d: V, shade: Shade<'_>, f: &dyn Fn(f64) -> V) -> V {
         let (a, b, c) = (
             d[0] * d[0] + d[2] * d[2],
             EYE[0] * d[0] + EYE[2] * d[2],
@@ -397,7 +400,7 @@ impl Studio {
     fn save(&self, light: &Light, time: f64, shot: usize, path: &Path) {
         let (width, height) = self.size;
         let mut random = Random(self.seed.wrapping_mul(977).wrapping_add(shot as u64));
-        let sign = if shot % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = if shot.is_multiple_of(2) { 1.0 } else { -1.0 };
         let gains = [
             self.gains[0] * (1.0 + sign * self.drift.0),
             self.gains[1],
