@@ -138,7 +138,7 @@ pub enum BeginError {
         source: std::io::Error,
     },
     /// Another server.
-    #[error("another `foilpress serve` keeps its jobs in {}; stop it, or choose another folder with --jobs", .0.display())]
+    #[error("another server keeps its jobs in {}; stop it, or choose another folder with --jobs", .0.display())]
     Twice(PathBuf),
 }
 

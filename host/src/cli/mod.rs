@@ -31,8 +31,7 @@ use observe::visible_line;
     version,
     after_help = "Examples:\n  \
         foilpress print sample:leaf\n  \
-        foilpress layers white.png gold.png black.png --finish artwork\n  \
-        foilpress send job.rgl --to serial:/dev/ttyACM0\n\n\
+        foilpress layers white.png gold.png black.png --finish artwork\n\n\
         Steps of `print`: factor, map, halftone, layout, separate, encode, simulate",
     after_long_help = "Examples:\n  \
         foilpress print sample:leaf\n  \

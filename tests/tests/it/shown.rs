@@ -357,6 +357,7 @@ fn measuring_inks() {
 #[test]
 fn print_queues() {
     document("docs/guide/queue.md");
+    document("docs/guide/serve.md");
 }
 
 #[test]

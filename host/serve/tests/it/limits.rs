@@ -13,7 +13,7 @@ use super::Running;
 const GET_PRINTER: u16 = 11;
 
 /// A finished job of one sheet.
-fn sheet() -> Vec<u8> {
+pub fn sheet() -> Vec<u8> {
     use press::job::stream::write_job;
     use protocol::{ink::Ink, paper::Paper, rgl::Page};
     let plane = sheet::Plane { width: 800, length: 400, stride: 100, bits: vec![0x55; 100 * 400] };

@@ -1,6 +1,7 @@
 //! The server as its clients see it: over a socket.
 
 mod clients;
+mod desk;
 mod limits;
 
 use std::net::{SocketAddr, TcpListener};
