@@ -205,23 +205,24 @@ impl Ledger {
 
     /// All lines of all users that can be read, oldest first, and how many cannot be read.
     pub fn lines(&self) -> Result<(Vec<Line>, usize), LedgerError> {
-        let mut found = Vec::new();
+        let mut paths: Vec<PathBuf> = Vec::new();
+        // What was counted in the folder before came first, also within a second.
         for folder in self.other.iter().chain([&self.folder]) {
-            match fs::read_dir(folder) {
-                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-                listing => found.extend(listing.map_err(self.error("read"))?),
-            }
+            let listing = match fs::read_dir(folder) {
+                Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+                listing => listing.map_err(self.error("read"))?,
+            };
+            let mut its: Vec<PathBuf> = listing
+                .filter_map(|item| Some(item.ok()?.path()))
+                .filter(|path| {
+                    let name = path.file_name().and_then(|name| name.to_str());
+                    name.is_some_and(|name| name.starts_with(PREFIX) && name.ends_with(".jsonl"))
+                        && path.symlink_metadata().is_ok_and(|found| found.is_file())
+                })
+                .collect();
+            its.sort();
+            paths.append(&mut its);
         }
-        let mut paths: Vec<PathBuf> = found
-            .into_iter()
-            .filter_map(|item| Some(item.ok()?.path()))
-            .filter(|path| {
-                let name = path.file_name().and_then(|name| name.to_str());
-                name.is_some_and(|name| name.starts_with(PREFIX) && name.ends_with(".jsonl"))
-                    && path.symlink_metadata().is_ok_and(|found| found.is_file())
-            })
-            .collect();
-        paths.sort();
         let (mut lines, mut damaged) = (Vec::new(), 0);
         for path in paths {
             let (mut its, torn) = self.lines_of(&path)?;
