@@ -359,8 +359,9 @@ test('the status question waits until it is known that the printer stands betwee
   await bench.connect('bulk');
   assert.equal((await bench.ask(STATUS)).answer, 'unsure');
   assert.deepEqual(bench.printer.taken, []);
-  await bench.say(initialise());
-  await bench.pass(5);
+  await bench.say(initialise(777));
+  // It is answered when the printer has been reset.
+  await bench.hear(({ kind, request }) => kind === 'lines' && request === 777);
   assert.deepEqual([...(await bench.ask(STATUS)).answer], status);
 });
 

@@ -79,7 +79,7 @@ export const cancel = (job) => frame([3, ...varint(job)]);
 export const ask = (request, what) => frame([4, ...varint(request), what]);
 export const configure = ({ setup, strobe, hold, settle, handshake = 0, patience = 600, heed = 0x3f }) =>
   frame([5, ...[setup, strobe, hold, settle].flatMap(varint), handshake, ...varint(patience), heed]);
-export const initialise = () => frame([6]);
+export const initialise = (request = 0) => frame([6, ...varint(request)]);
 export const drive = (level, lines) => frame([8, level, lines]);
 export const probe = (request, level, lines) => frame([9, ...varint(request), level, lines]);
 export const abandon = (job) => frame([11, ...varint(job)]);
