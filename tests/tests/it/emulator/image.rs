@@ -27,7 +27,7 @@ macro_rules! scripts {
     };
 }
 
-scripts!(alone, control, failure, faults, firmware, plain, restart, speed, wiring);
+scripts!(alone, control, failure, faults, firmware, plain, restart, speed, windows, wiring);
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("emulator")

@@ -2,23 +2,25 @@
 //!
 //! Problem: whoever owns such a printer has a Raspberry Pi or a Windows computer, and no compiler.
 //! Method: one optimised build a system with a cross linker; a Debian package for each kind of Debian, an archive with everything
-//! in one folder for the others; then the program of each archive runs here, by itself or under an emulator, and its jobs are
-//! compared byte for byte with this machine's. `tried.md` says what came of it. Sums and a part of the changelog go beside them.
+//! in one folder for the others; then each archive is unpacked and its program runs here, by itself or under an emulator ([`trial`]), and
+//! its jobs are compared byte for byte with this machine's. `tried.md` says what came of it. Sums and a part of the changelog go beside them.
 //! Paths of this machine are taken out of the programs, and times are that of the commit, so the same commit gives the same bytes with
 //! the same tools.
 //! Cost: an optimised build for each system. Limits: the C libraries of Windows and of the static program round exponentials and the
-//! like otherwise, so there a few dots of a material may differ, and only the jobs' sizes have to agree. macOS is not built here (`packaging/macos`); nothing is signed; a board, WinUSB and
-//! a real printer are for people to try.
+//! like otherwise, so there a few dots of a material may differ, and only the jobs' sizes have to agree. macOS is not built here
+//! (`packaging/macos`); nothing is signed; a board, WinUSB and a real printer are for people to try.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::{env, fs};
 
-use anyhow::{Context as _, Result, bail, ensure};
+use anyhow::{Context as _, Result, ensure};
 
 use crate::package::{self, Profile};
 use crate::{cargo, command, firmware, succeed};
+
+mod trial;
 
 /// What an archive is.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -114,13 +116,13 @@ pub fn run(root: &Path, only: &[String], dry: bool) -> Result<()> {
     let _ = fs::remove_dir_all(&release.dist);
     fs::create_dir_all(&release.dist)?;
     firmware::build(root)?;
-    let mut tried = String::from(
-        "| system | program | archive | version, sample, layers and plan | the same bytes as on amd64 |\n|---|---|---|---|---|\n",
-    );
+    let mut tried = String::from(trial::HEAD);
+    let bridge = release.build(&SYSTEMS[0], &["--package", "foilpress-tests", "--bin", "served-bridge"])?;
+    let bridge = bridge.join("served-bridge");
     let mut expected = None;
     for system in chosen {
         println!("== {}", system.name);
-        let program = release.build(system)?;
+        let program = release.program(system)?;
         let size = fs::metadata(&program)?.len();
         ensure!(
             size <= LARGEST_PROGRAM,
@@ -134,17 +136,11 @@ pub fn run(root: &Path, only: &[String], dry: bool) -> Result<()> {
             "{} has {length} bytes",
             archive.display()
         );
-        let made = release.try_program(system, &program)?;
+        let folder = firmware::workspace_target(root).join("release-tried").join(system.name);
+        let made = trial::run(system, &archive, &folder, &bridge)?;
         let expected: &Vec<Vec<u8>> = expected.get_or_insert_with(|| made.clone());
         let same = made == *expected;
-        let with = system.runner.map_or("by itself", |(runner, _)| runner[0]);
-        let alike = if same { "yes" } else { "other roundings, sizes within a hundredth" };
-        tried += &format!(
-            "| {} | {:.1} MB | {:.1} MB | {with} | {alike} |\n",
-            system.name,
-            size as f64 / 1e6,
-            length as f64 / 1e6,
-        );
+        tried += &trial::line(system, [size, length], same);
         let near = made.iter().zip(expected).all(|(a, b)| a.len().abs_diff(b.len()) <= b.len() / 100);
         let right = same || near && !matches!(system.form, Form::Deb(_));
         ensure!(right, "the program for {} makes other jobs of the same art", system.name);
@@ -183,11 +179,11 @@ impl System {
             missing.push(format!("{}: rustup target add {}", self.name, self.triple));
         }
         let runner = self.runner.map(|(runner, package)| (runner[0], package));
-        let packer = match self.form {
-            Form::Zip => Some(("zip", "zip")),
-            Form::Deb(_) | Form::Tar => None,
+        let packers: &[(&str, &str)] = match self.form {
+            Form::Zip => &[("zip", "zip"), ("unzip", "unzip")],
+            Form::Deb(_) | Form::Tar => &[],
         };
-        for (program, package) in self.linker.into_iter().chain(runner).chain(packer) {
+        for (program, package) in self.linker.into_iter().chain(runner).chain(packers.iter().copied()) {
             if !on_path(program) {
                 missing.push(format!("{}: {program}: apt install {package}", self.name));
             }
@@ -225,18 +221,15 @@ impl Release<'_> {
     }
 
     /// The optimised program.
-    fn build(&self, system: &System) -> Result<PathBuf> {
-        let mut build = cargo(&[
-            "build",
-            "--release",
-            "--locked",
-            "--package",
-            "foilpress",
-            "--features",
-            "serve",
-            "--target",
-            system.triple,
-        ]);
+    fn program(&self, system: &System) -> Result<PathBuf> {
+        let folder = self.build(system, &["--package", "foilpress", "--features", "serve"])?;
+        Ok(folder.join(system.program()))
+    }
+
+    /// Builds this with optimisation; the folder where it is then.
+    fn build(&self, system: &System, what: &[&str]) -> Result<PathBuf> {
+        let mut build = cargo(&["build", "--release", "--locked", "--target", system.triple]);
+        build.args(what);
         let home = env::var_os("CARGO_HOME").map(PathBuf::from);
         let home =
             home.or_else(|| Some(PathBuf::from(env::var_os("HOME")?).join(".cargo"))).unwrap_or_default();
@@ -255,7 +248,7 @@ impl Release<'_> {
             build.env(format!("CC_{triple}"), linker);
         }
         succeed(&mut build)?;
-        Ok(firmware::workspace_target(self.root).join(system.triple).join("release").join(system.program()))
+        Ok(firmware::workspace_target(self.root).join(system.triple).join("release"))
     }
 
     /// The archive in `dist/`.
@@ -313,7 +306,7 @@ impl Release<'_> {
         let native = &SYSTEMS[0];
         let program =
             firmware::workspace_target(self.root).join(native.triple).join("release").join(native.program());
-        if program.is_file() { Ok(program) } else { self.build(native) }
+        if program.is_file() { Ok(program) } else { self.program(native) }
     }
 
     /// Everything in one folder.
@@ -346,50 +339,6 @@ impl Release<'_> {
         Ok(folder)
     }
 
-    /// Runs the program as its users do first, and gives what it has made.
-    fn try_program(&self, system: &System, program: &Path) -> Result<Vec<Vec<u8>>> {
-        let folder =
-            empty_folder(&firmware::workspace_target(self.root).join("release-tried").join(system.name))?;
-        if system.form == Form::Zip {
-            random_numbers_for_wine(program)?;
-        }
-        let run = |arguments: &[&str]| {
-            let mut run = match system.runner {
-                Some(([runner, options @ ..], _)) => {
-                    let mut run = command(runner, options);
-                    run.arg(program);
-                    run
-                }
-                _ => Command::new(program),
-            };
-            run.args(arguments).current_dir(&folder).stdin(Stdio::null());
-            // Wine has a computer of its own, and no screen.
-            run.env("WINEDEBUG", "-all")
-                .env("WINEPREFIX", folder.with_file_name("wine"))
-                .env_remove("DISPLAY");
-            let output = run.output().with_context(|| format!("cannot start {run:?}"))?;
-            if !output.status.success() {
-                bail!("{run:?}: {}", String::from_utf8_lossy(&output.stderr));
-            }
-            Ok(output.stdout)
-        };
-        let version = run(&["--version"])?;
-        ensure!(version.starts_with(b"foilpress "), "it said {}", String::from_utf8_lossy(&version));
-        // A folder with a blank and a letter that is not ASCII in its name.
-        let out = "my prints é";
-        run(&["print", "sample:leaf", "--size", "20mm", "--to", "file:leaf.rgl", "-o", out])?;
-        fs::write(folder.join("art.svg"), ART)?;
-        run(&["layers", "art.svg", "--to", "file:layers.rgl"])?;
-        let plan = run(&["plan", "layers.rgl", "--json"])?;
-        let read = |name: &str| {
-            fs::read(folder.join(name)).with_context(|| format!("{} has made no {name}", system.name))
-        };
-        let made = vec![read("leaf.rgl")?, read("layers.rgl")?, plan];
-        ensure!(folder.join(out).join("job.rgl").is_file(), "{} has not written into {out}", system.name);
-        fs::remove_dir_all(&folder)?;
-        Ok(made)
-    }
-
     /// The sums of all files, for `sha256sum --check`.
     fn sums(&self) -> Result<()> {
         let mut names: Vec<OsString> =
@@ -399,26 +348,6 @@ impl Release<'_> {
         ensure!(said.status.success(), "sha256sum: {}", String::from_utf8_lossy(&said.stderr));
         Ok(fs::write(self.dist.join("SHA256SUMS"), said.stdout)?)
     }
-}
-
-/// A small page in two inks and a tint.
-const ART: &str = r##"<svg xmlns="http://www.w3.org/2000/svg" width="30mm" height="20mm" viewBox="0 0 30 20"><rect width="30" height="20" fill="#f0c080"/><circle cx="15" cy="10" r="6" fill="#204080"/></svg>"##;
-
-fn empty_folder(folder: &Path) -> Result<PathBuf> {
-    let _ = fs::remove_dir_all(folder);
-    fs::create_dir_all(folder)?;
-    Ok(folder.to_owned())
-}
-
-/// Wine before version 9 lacks the library from which programs of Windows 10 have their random numbers: one that asks the older function lies
-/// beside the program while it is tried.
-fn random_numbers_for_wine(program: &Path) -> Result<()> {
-    const SOURCE: &str = "#include <windows.h>\n#include <ntsecapi.h>\n\
-        __declspec(dllexport) BOOL WINAPI ProcessPrng(PBYTE data, SIZE_T length) { return RtlGenRandom(data, (ULONG)length); }\n";
-    let source = program.with_file_name("bcryptprimitives.c");
-    fs::write(&source, SOURCE)?;
-    let mut compile = command("x86_64-w64-mingw32-gcc", &["-shared", "-o"]);
-    succeed(compile.arg(source.with_extension("dll")).arg(&source).arg("-ladvapi32"))
 }
 
 fn all_files(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
