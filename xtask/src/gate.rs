@@ -16,7 +16,7 @@ use anyhow::{Context, Result};
 
 use crate::firmware::BARE_METAL;
 use crate::runner::{self, Runner};
-use crate::{cargo, command, emulator, package, preview, queue, succeed};
+use crate::{cargo, command, emulator, foreign, package, preview, queue, succeed};
 
 /// Names the list of tests that were left out; `.cargo/config.toml` sets it.
 const SKIPS: &str = "FOILPRESS_SKIPS";
@@ -82,6 +82,7 @@ pub fn run(root: &Path, is_full: bool) -> ExitCode {
                 "warnings",
             ]))
         });
+        gate.step("lints for macOS and Windows", || foreign::lint(root));
         gate.step("documentation", || {
             let mut doc = cargo(&["doc", "--workspace", "--no-deps", "--locked"]);
             succeed(doc.env("RUSTDOCFLAGS", "-D warnings"))

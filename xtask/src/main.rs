@@ -7,6 +7,7 @@ mod documents;
 mod elf;
 mod emulator;
 mod firmware;
+mod foreign;
 mod gate;
 mod package;
 mod preview;
@@ -30,7 +31,7 @@ struct Args {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Run everything that has to pass: format, lints, documents, all tests, emulator, print queues, package
+    /// Run everything that has to pass: format, lints (for macOS and Windows too), documents, all tests, emulator, print queues, package
     Test {
         /// Run the commands of documents and help as they stand, and sixteen times as many cases of each property, and the whole system under one seed after another: some three hours
         #[arg(long)]
