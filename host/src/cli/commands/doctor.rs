@@ -32,6 +32,16 @@ pub struct Args {
     json: bool,
 }
 
+/// Where the operating system itself shows a bridge.
+const LISTED: &str = if cfg!(windows) {
+    "Windows shows one in its Device Manager as \"Foilpress bridge\" under \"Universal Serial Bus devices\", and its port under \
+     \"Ports (COM & LPT)\"; with a yellow mark there, plug it into another socket once. "
+} else if cfg!(target_os = "macos") {
+    "macOS lists one in its System Information under USB. "
+} else {
+    ""
+};
+
 /// What was found so far.
 struct Visit<W> {
     out: W,
@@ -57,10 +67,10 @@ pub fn run(args: &Args) -> Result<()> {
     let boards = if args.to.is_none() { visit.boards()? } else { 0 };
     visit.found["boards_in_boot_loader"] = boards.into();
     if bridges.is_empty() && boards == 0 {
-        visit.trouble(
+        visit.trouble(&format!(
             "no bridge found on USB: plug it in. If it is plugged in, its cable may carry no data, or it has no firmware yet: hold \
-             its BOOTSEL button while plugging it in, then run `foilpress bridge flash`. Name a bridge elsewhere with --to",
-        )?;
+             its BOOTSEL button while plugging it in, then run `foilpress bridge flash`. {LISTED}Name a bridge elsewhere with --to",
+        ))?;
     }
     for bridge in &bridges {
         visit.bridge(bridge)?;
