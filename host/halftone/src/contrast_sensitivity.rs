@@ -182,12 +182,15 @@ pub fn errors_seen(planes: &[Vec<f64>], eye: &Eye) -> Vec<f64> {
     // Two real planes make one complex image, whose power is the sum of theirs where frequencies weigh the same both ways.
     for pair in planes.chunks(2) {
         let second = |at: usize| pair.get(1).map_or(0.0, |plane| plane[at]);
-        let mut image: Vec<Complex<f64>> =
-            pair[0].iter().enumerate().map(|(at, &first)| Complex::new(first, second(at))).collect();
+        let mut image: Vec<Complex<f32>> = pair[0]
+            .iter()
+            .enumerate()
+            .map(|(at, &first)| Complex::new(first as f32, second(at) as f32))
+            .collect();
         transform(&mut image, width);
         for (at, value) in image.iter().enumerate() {
             for (sum, seen) in sums.iter_mut().zip(eye.squared(at)) {
-                *sum += seen * value.norm_sqr();
+                *sum += seen * f64::from(value.norm_sqr());
             }
         }
     }
@@ -221,7 +224,7 @@ pub fn peak(width: usize, index: &[u8], stack: u8, near: f64, far: usize) -> (f6
     let (wide, high) = (2 * width, 2 * height);
     let mut image = vec![Complex::default(); wide * high];
     for (at, &dot) in index.iter().enumerate() {
-        image[at / width * wide + at % width].re = f64::from(u8::from(dot == stack)) - mean;
+        image[at / width * wide + at % width].re = (f64::from(u8::from(dot == stack)) - mean) as f32;
     }
     transform(&mut image, wide);
     for value in &mut image {
@@ -239,7 +242,7 @@ pub fn peak(width: usize, index: &[u8], stack: u8, near: f64, far: usize) -> (f6
             }
             let overlap = (width as f64 - f64::from(x.abs())) * (height as f64 - f64::from(y));
             let at = y as usize * wide + x.rem_euclid(wide as i32) as usize;
-            let value = (image[at].re / (wide * high) as f64 / overlap / variance).abs();
+            let value = (f64::from(image[at].re) / (wide * high) as f64 / overlap / variance).abs();
             if value > most.0 {
                 most = (value, (x, y));
             }
