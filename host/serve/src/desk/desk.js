@@ -72,7 +72,7 @@ function show(about) {
   slots(about.cartridges);
   fill(at("printer"), about.printers.map(({ name, about: words }) => [name, `${name}: ${words}`]));
   if (fill(at("which"), about.charts.map(({ name, label }) => [name, label]))) {
-    about.charts.forEach(({ look }, place) => { at("which").options[place].dataset.look = look; });
+    about.charts.forEach((chart, place) => { at("which").options[place].dataset.look = chart.look; });
     at("look").textContent = about.charts[0].look;
   }
   fill(at("size"), about.sizes.map(({ keyword, label }) => [keyword, label]), about.loaded.size);
