@@ -1,37 +1,15 @@
 // The other pages that the program writes. With `FOILPRESS_KEEP` a picture of each stays in that folder.
 
 import assert from 'node:assert/strict';
-import { readFile } from 'node:fs/promises';
-import { createRequire } from 'node:module';
 import { resolve } from 'node:path';
 import test from 'node:test';
-import { open, rested } from './browser.mjs';
+import { rested, visited } from './browser.mjs';
 
 const folder = resolve(process.env.FOILPRESS_PAGE ?? '.');
-const axe = await readFile(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 const desk = { width: 1000, height: 760, webgl: false, beside: true };
 
-/** Runs in a page, and fails if the page complained, or if axe-core finds anything on a desk or a phone. */
-async function visit(name, how, run) {
-  const { browser, page, complaints } = await open(`${folder}/${name}`, how);
-  try {
-    await run(page);
-    await page.evaluate(axe);
-    for (const width of [1280, 390]) {
-      await page.setViewportSize({ width, height: 844 });
-      const { violations } = await page.evaluate(() => window.axe.run());
-      assert.deepEqual(violations.map(({ id, nodes }) => [id, nodes.map((node) => node.html)]), [], `${width} pixels`);
-      // Nothing is wider than a phone, but tables that scroll for themselves.
-      assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), `wider than ${width} pixels`);
-      if (process.env.FOILPRESS_KEEP) {
-        await page.screenshot({ path: `${process.env.FOILPRESS_KEEP}/${name.replaceAll('/', '-')}-${how.colorScheme}-${width}.png`, fullPage: true });
-      }
-    }
-    assert.deepEqual(complaints, []);
-  } finally {
-    await browser.close();
-  }
-}
+/** @type {(name: string, how: any, run: (page: import('playwright-core').Page) => Promise<void>) => Promise<void>} */
+const visit = (name, how, run) => visited(`${folder}/${name}`, name, how, run);
 
 for (const colorScheme of ['light', 'dark']) {
   test(`the display follows mouse and keyboard, ${colorScheme}`, () => visit('wall/display.html', { ...desk, touch: true, colorScheme }, async (page) => {

@@ -5,8 +5,10 @@
 pub mod engine;
 pub mod frame;
 pub mod host;
+pub mod ipp;
 pub mod kept;
 pub mod picoboot;
+pub mod raster;
 pub mod rgl;
 pub mod runs;
 pub mod talk;

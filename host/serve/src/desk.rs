@@ -2,11 +2,14 @@
 //!
 //! Method: the page is three files in the program, and asks for one description of everything every two seconds. A document that is
 //! dropped on it becomes a held job; its sheets are drawn, and what the simulated printer makes of the first one is shown with its
-//! passes. Printing releases the job, whose sheets are there already.
+//! passes. Printing releases the job, whose sheets are there already. Charts go the same way ([`charts`]).
 //! Cost: a preview is a picture of a sheet, dot for dot, made once. Limits: no file of another machine, so it works without internet.
 //! Source: what owners like of LPrint and PAPPL: the loaded sheet is set here, for dialogs can only read it.
 
 use std::fs;
+use std::net::IpAddr;
+use std::path::PathBuf;
+use std::sync::PoisonError;
 
 use bytes::Bytes;
 use http_body_util::Full;
@@ -15,11 +18,12 @@ use hyper::{Response, StatusCode};
 use observe::{Silent, with_causes};
 use serde_json::{Value, json};
 
+use crate::charts::{self, CHARTS};
 use crate::http::{Gone, Limits, keep, plain, words};
-use crate::jobs::{Job, State};
+use crate::jobs::{Job, Owner, State};
 use crate::operations;
 use crate::server::{ChangeError, Data, Loaded, Server};
-use crate::spool::Packing;
+use crate::spool::{Kind, Packing, Spool, SpoolError};
 use crate::template::{AUTO, SHEETS, TYPES, Ticket, keyword_of, size_of};
 use crate::worker;
 use device::forms;
@@ -30,6 +34,8 @@ use protocol::ink::Ink;
 
 /// Who asks.
 pub struct Guest {
+    /// Where they are.
+    pub from: IpAddr,
     /// Whether they may change what is not theirs.
     pub may_change: bool,
 }
@@ -72,7 +78,13 @@ pub async fn post(
 ) -> Response<Full<Bytes>> {
     let job = number(query, "job");
     let done = match (path, guest.may_change) {
-        ("/desk/print", _) => return upload(server, query, &mut body, limits).await,
+        ("/desk/print", _) => return upload(server, query, guest.from, &mut body, limits).await,
+        ("/desk/chart", _) => {
+            return tokio::task::block_in_place(|| match chart(server, query, guest.from) {
+                Ok(id) => plain(StatusCode::OK, "application/json", json!({ "job": id }).to_string()),
+                Err(why) => words(StatusCode::UNPROCESSABLE_ENTITY, &why),
+            });
+        }
         ("/desk/plan", _) => {
             return tokio::task::block_in_place(|| match plan(server, job.unwrap_or(0)) {
                 Ok(plan) => plain(StatusCode::OK, "application/json", plan.to_string()),
@@ -109,17 +121,20 @@ pub async fn post(
 }
 
 /// A document from the page: a job that is held until somebody has seen its plan.
-async fn upload(server: &Server, query: &str, body: &mut Incoming, limits: &Limits) -> Response<Full<Bytes>> {
+async fn upload(
+    server: &Server,
+    query: &str,
+    from: IpAddr,
+    body: &mut Incoming,
+    limits: &Limits,
+) -> Response<Full<Bytes>> {
     let Some(printer) = server.printer(&parameter(query, "printer").unwrap_or_default()) else {
         return words(StatusCode::NOT_FOUND, "there is no such printer");
     };
     let name = parameter(query, "name").unwrap_or_else(|| "Untitled".into());
-    let ticket = tokio::task::block_in_place(|| {
-        let loaded = server.data().loaded().clone();
-        let kind = Some(loaded.kind).filter(|kind| kind != AUTO);
-        Ticket { size: Some(loaded.size), kind, held: true, ..Ticket::default() }
-    });
-    let id = match tokio::task::block_in_place(|| server.create(printer, &name, "desk", ticket)) {
+    let owner = Owner { user: "desk".into(), from: Some(from) };
+    let created = || server.create(printer, &name, owner, on_loaded_sheet(server));
+    let id = match tokio::task::block_in_place(created) {
         Ok(id) => id,
         Err(error) => return words(StatusCode::SERVICE_UNAVAILABLE, &with_causes(&error)),
     };
@@ -128,21 +143,56 @@ async fn upload(server: &Server, query: &str, body: &mut Incoming, limits: &Limi
         let Gone = Gone;
         return words(StatusCode::REQUEST_TIMEOUT, "the document did not come in time");
     };
-    tokio::task::block_in_place(|| {
-        let arrived = match kept {
-            Ok((path, kind, octets)) => operations::keep_document(server, id, &path, kind, octets)
-                .and_then(|()| server.arrived(id))
-                .map_err(|error| with_causes(&error)),
-            Err(error) => Err(with_causes(&error)),
-        };
-        match arrived {
-            Ok(()) => plain(StatusCode::OK, "application/json", json!({ "job": id }).to_string()),
-            Err(why) => {
-                server.forget(id);
-                words(StatusCode::UNPROCESSABLE_ENTITY, &why)
-            }
-        }
+    tokio::task::block_in_place(|| match held(server, id, kept) {
+        Ok(()) => plain(StatusCode::OK, "application/json", json!({ "job": id }).to_string()),
+        Err(why) => words(StatusCode::UNPROCESSABLE_ENTITY, &why),
     })
+}
+
+/// What the page asks for: the loaded sheet, and to wait.
+fn on_loaded_sheet(server: &Server) -> Ticket {
+    let loaded = server.data().loaded().clone();
+    let kind = Some(loaded.kind).filter(|kind| kind != AUTO);
+    Ticket { size: Some(loaded.size), kind, held: true, ..Ticket::default() }
+}
+
+/// A job has its document, and waits; one whose document is none is forgotten.
+fn held(server: &Server, id: u32, kept: Result<(PathBuf, Kind, u64), SpoolError>) -> Result<(), String> {
+    let arrived = kept.map_err(|error| with_causes(&error)).and_then(|(path, kind, octets)| {
+        operations::keep_document(server, id, &path, kind, octets)
+            .and_then(|()| server.arrived(id))
+            .map_err(|error| with_causes(&error))
+    });
+    if arrived.is_err() {
+        server.forget(id);
+    }
+    arrived
+}
+
+/// A chart becomes a job that is held, as a document does.
+fn chart(server: &Server, query: &str, from: IpAddr) -> Result<u32, String> {
+    let printer =
+        server.printer(&parameter(query, "printer").unwrap_or_default()).ok_or("there is no such printer")?;
+    let name = parameter(query, "chart").unwrap_or_default();
+    let ticket = on_loaded_sheet(server);
+    let bytes = {
+        let _drawing = server.drawing.lock().unwrap_or_else(PoisonError::into_inner);
+        let inks = {
+            let data = server.data();
+            let loaded = data.cartridges.iter().filter(|found| found.is_loaded);
+            charts::inks(loaded.map(|found| found.name.as_str()))
+        };
+        let choices = ticket.choices(&printer.choices);
+        charts::job(&name, &choices, &inks, &server.settings.library, &Silent)
+            .map_err(|error| error.to_string())?
+    };
+    let owner = Owner { user: "desk".into(), from: Some(from) };
+    let id = server
+        .create(printer, &format!("chart {name}"), owner, ticket)
+        .map_err(|error| with_causes(&error))?;
+    let kept = Spool::begin(&server.store.folder(id), Packing::None, bytes.len() as u64)
+        .and_then(|mut spool| spool.take(&bytes).and_then(|()| spool.end()));
+    held(server, id, kept).map(|()| id)
 }
 
 /// What a held job would print: its passes and the ribbon they take, and a preview of its first sheet.
@@ -210,6 +260,7 @@ fn describe(server: &Server) -> Value {
         .chain(TYPES.iter().map(|row| (row.0, row.1)))
         .map(|(keyword, label)| json!({ "keyword": keyword, "label": label }))
         .collect();
+    let charts = CHARTS.map(|(name, label, look)| json!({ "name": name, "label": label, "look": look }));
     let jobs: Vec<Value> = data.jobs.values().rev().take(50).map(|job| about(&data, job)).collect();
     let ribbons = Ledger::of(&server.settings.devices).lines().map_or_else(
         |_| Vec::new(),
@@ -222,6 +273,7 @@ fn describe(server: &Server) -> Value {
     let wanted = data.reasons.contains(&queue::messages::Reason::SupplyMissing);
     json!({
         "printers": printers,
+        "charts": charts,
         "sizes": sizes,
         "types": types,
         "loaded": { "size": keyword_of(loaded.size), "kind": loaded.kind },
@@ -256,7 +308,7 @@ fn about(data: &Data, job: &Job) -> Value {
     json!({
         "id": job.id,
         "name": job.name,
-        "user": job.user,
+        "user": job.owner.user,
         "printer": job.printer,
         "state": words,
         "over": job.state.is_over(),

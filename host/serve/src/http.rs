@@ -294,7 +294,8 @@ async fn respond(
         (&Method::POST, path) if kind == "application/ipp" => {
             let printer = path.trim_matches('/').strip_prefix("ipp/print").unwrap_or("");
             let printer = printer.trim_matches('/').to_owned();
-            let place = Place { host, is_encrypted, printer };
+            let from = peer.ip().to_canonical();
+            let place = Place { host, is_encrypted, printer, from, may_change };
             ipp(server, request.into_body(), &place, limits).await
         }
         (&Method::GET | &Method::HEAD, path) => {
@@ -304,7 +305,7 @@ async fn respond(
         (&Method::POST, path) => {
             let query = request.uri().query().unwrap_or_default().to_owned();
             let path = path.to_owned();
-            let guest = desk::Guest { may_change };
+            let guest = desk::Guest { from: peer.ip().to_canonical(), may_change };
             desk::post(server, &path, &query, &guest, request.into_body(), limits).await
         }
         _ => words(StatusCode::METHOD_NOT_ALLOWED, "there is no such thing to do"),
@@ -395,6 +396,9 @@ async fn ipp(server: &Server, mut body: Incoming, place: &Place, limits: &Limits
         return plain(StatusCode::OK, IPP, response.bytes());
     }
     if !operations::takes_document(&request) {
+        // The end of a body in chunks comes behind its last byte. A connection that is not read to there is closed, and with it
+        // the answer may be lost.
+        drain(&mut body, limits).await;
         let response = block_in_place(|| operations::answer(server, place, &request));
         return plain(StatusCode::OK, IPP, response.bytes());
     }

@@ -1,8 +1,8 @@
 //! The server as a service of the system, and its advertisement: two kinds of files, and no trace when they are removed.
 //!
 //! Method: a systemd unit starts the server with a sandbox of its own, as the user of the print system, who may open a bridge. A service
-//! file of Avahi for each printer makes it appear in print dialogs; Avahi itself announces on real interfaces. The identity in the
-//! advertisement is that of the printer, so no system shows it twice.
+//! file of Avahi for each printer makes it appear in print dialogs. The identity in the advertisement is that of the printer, so no
+//! system shows it twice; the server itself announces nothing where Avahi does ([`crate::advert`]).
 //! Limits: Linux with systemd and Avahi.
 //! Source: systemd.exec(5), avahi.service(5); Bonjour Printing Specification 1.2.1 and PWG 5100.14, section 4, for the keys.
 
@@ -12,9 +12,8 @@ use std::path::{Path, PathBuf};
 
 use files::durable::{self, Access};
 
-use crate::printer::{DEVICE_ID, MODEL, URF};
+use crate::advert::{keys, title};
 use crate::server::Preset;
-use crate::spool::KINDS;
 
 /// The name of the unit.
 pub const UNIT: &str = "foilpress-serve.service";
@@ -145,7 +144,7 @@ fn unit(service: &Service<'_>) -> String {
     format!(
         "[Unit]\n\
          Description=Foilpress print server (IPP Everywhere) for the ALPS MD-5500\n\
-         After=network-online.target\n\
+         After=network-online.target avahi-daemon.service\n\
          Wants=network-online.target\n\
          \n\
          [Service]\n\
@@ -181,45 +180,6 @@ fn unit(service: &Service<'_>) -> String {
     )
 }
 
-/// The keys of a printer's advertisement.
-pub fn keys(preset: &Preset, uuid: &str) -> Vec<(&'static str, String)> {
-    let mut pdl: Vec<&str> = Vec::new();
-    KINDS.iter().for_each(|kind| {
-        if !pdl.contains(&kind.mime) {
-            pdl.push(kind.mime);
-        }
-    });
-    let colour = if preset.choices.colours.len() > 1 { "T" } else { "F" };
-    let id = |key: &str| {
-        DEVICE_ID
-            .split(';')
-            .find_map(|pair| pair.strip_prefix(key)?.strip_prefix(':'))
-            .unwrap_or_default()
-            .to_owned()
-    };
-    vec![
-        ("txtvers", "1".into()),
-        ("qtotal", "1".into()),
-        ("rp", format!("ipp/print/{}", preset.name)),
-        ("ty", MODEL.into()),
-        ("product", "(MD-5500)".into()),
-        ("usb_MFG", id("MFG")),
-        ("usb_MDL", id("MDL")),
-        ("note", String::new()),
-        ("priority", "50".into()),
-        ("pdl", pdl.join(",")),
-        ("URF", URF.join(",")),
-        ("Color", colour.into()),
-        ("Duplex", "F".into()),
-        ("PaperMax", "legal-A4".into()),
-        ("kind", "document,photo".into()),
-        ("UUID", uuid.into()),
-        ("mopria-certified", "1.3".into()),
-        ("air", "none".into()),
-        ("TLS", "1.2".into()),
-    ]
-}
-
 fn advertisement(preset: &Preset, uuid: &str, port: u16) -> String {
     let escape = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     let records: String = keys(preset, uuid)
@@ -230,7 +190,7 @@ fn advertisement(preset: &Preset, uuid: &str, port: u16) -> String {
         "<?xml version=\"1.0\" standalone='no'?>\n\
          <!DOCTYPE service-group SYSTEM \"avahi-service.dtd\">\n\
          <service-group>\n  \
-         <name replace-wildcards=\"yes\">ALPS {} @ %h</name>\n  \
+         <name replace-wildcards=\"yes\">{}</name>\n  \
          <service>\n    \
          <type>_ipp._tcp</type>\n    \
          <subtype>_print._sub._ipp._tcp</subtype>\n    \
@@ -246,7 +206,7 @@ fn advertisement(preset: &Preset, uuid: &str, port: u16) -> String {
          {records}  \
          </service>\n\
          </service-group>\n",
-        escape(&preset.name)
+        escape(&title(&preset.name, "%h"))
     )
 }
 

@@ -11,6 +11,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
+use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 
 use files::durable::{self, Access};
@@ -50,6 +51,15 @@ impl State {
     }
 }
 
+/// Whose a job is: a name that everybody can say, from a computer that nobody else has meanwhile.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct Owner {
+    /// What they call themselves.
+    pub user: String,
+    /// Where they are.
+    pub from: Option<IpAddr>,
+}
+
 /// A job.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Job {
@@ -60,7 +70,7 @@ pub struct Job {
     /// What its owner calls it.
     pub name: String,
     /// Its owner.
-    pub user: String,
+    pub owner: Owner,
     /// What it asks for.
     pub ticket: Ticket,
     /// The name of its document's file; none until that is here.
@@ -230,7 +240,7 @@ mod tests {
             id,
             printer: "standard".into(),
             name: "leaf".into(),
-            user: "me".into(),
+            owner: Owner { user: "me".into(), from: None },
             ticket: Ticket::default(),
             document: Some("document.pdf".into()),
             format: "application/pdf".into(),

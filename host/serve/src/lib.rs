@@ -5,12 +5,14 @@
 //! browser ─────────────▶ [http] ─▶ [desk] ───────┘
 //! ```
 //! Each preset is a printer of its own, for dialogs show no vendor's options ([`template`]). What is drawn and how it is sent is what
-//! print queues do: this crate adds the protocol, jobs that outlive it, and who may do what ([`access`]).
+//! print queues do: this crate adds the protocol, jobs that outlive it, who may do what ([`access`]), and how dialogs find it ([`advert`]).
 //! Source: PWG 5100.14 (IPP Everywhere), RFC 8010 and 8011 (IPP), RFC 9110 and 9112 (HTTP).
 #![forbid(unsafe_code)]
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation, clippy::cast_sign_loss))]
 
 pub mod access;
+pub mod advert;
+pub mod charts;
 pub mod desk;
 pub mod http;
 pub mod install;

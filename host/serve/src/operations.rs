@@ -1,26 +1,29 @@
-//! What clients ask for: one function for each operation, and the attributes of jobs.
+//! What clients ask for: one function for each operation. The attributes of jobs are in `operations/about.rs`.
 //!
 //! Method: a request that has a document is judged before the document is read ([`begin`]); when it is on disk the job is answered for
 //! ([`arrived`]). All others are answered at once ([`answer`]).
-//! Limits: one document for a job. Whose a job is, is what the client says: on a network that everybody may print on, this is a name and
-//! not a proof.
+//! A job is changed by its owner, who says the same name from the same address, or by whoever may change everything
+//! ([`may_change`](crate::access::may_change)).
+//! Limits: one document for a job. Name and address are no proof on a network where somebody takes both.
 //! Source: RFC 8011, section 4; PWG 5100.7, 5100.11 and 5100.14.
 
+mod about;
+
+use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 
 use ipp::model::{DelimiterTag, Operation, StatusCode};
 use ipp::value::IppValue;
 
-use crate::jobs::{Job, State};
+pub use self::about::state;
+use self::about::{TEMPLATE, Wanted, attributes};
+use crate::jobs::{Job, Owner, State};
 use crate::printer;
-use crate::server::{ChangeError, Data, Preset, Server};
+use crate::server::{ChangeError, Preset, Server};
 use crate::spool::{KINDS, Kind, Packing, SpoolError};
-use crate::template::{AUTO, Ticket, keyword_of};
-use crate::values::{
-    date_time, each, integer, keyword, keywords, list, name, now, range, read_text, text, uri,
-};
+use crate::template::Ticket;
+use crate::values::{each, keyword, now, read_text};
 use crate::wire::{Request, Response};
-use queue::messages::Reason;
 
 /// The operations there are.
 pub const OPERATIONS: [Operation; 14] = [
@@ -49,6 +52,10 @@ pub struct Place {
     pub is_encrypted: bool,
     /// The printer's name in the path; empty for none.
     pub printer: String,
+    /// Where the client is.
+    pub from: IpAddr,
+    /// Whether it may change jobs of others.
+    pub may_change: bool,
 }
 
 impl Place {
@@ -159,6 +166,26 @@ fn job_of(server: &Server, place: &Place, request: &Request) -> Result<u32, Resp
     }
 }
 
+/// Whose jobs a request may be about as their owner's.
+fn owner(place: &Place, request: &Request) -> Owner {
+    let named = request.operation("requesting-user-name").and_then(read_text);
+    Owner { user: named.unwrap_or_else(|| "anonymous".into()), from: Some(place.from) }
+}
+
+/// The job that a request wants to change, which its owner may, and whoever may change everything.
+fn own_job(server: &Server, place: &Place, request: &Request) -> Result<u32, Response> {
+    let id = job_of(server, place, request)?;
+    let owner = owner(place, request);
+    match place.may_change || server.data().jobs.get(&id).is_some_and(|job| job.owner == owner) {
+        true => Ok(id),
+        false => Err(status(
+            request,
+            StatusCode::ClientErrorNotAuthorized,
+            "the job is somebody else's; its owner may change it, or the desk with the code of the server",
+        )),
+    }
+}
+
 /// A ticket, and what of the request is not possible.
 fn ticket(request: &Request) -> Result<(Ticket, Vec<(String, IppValue)>), Response> {
     let (mut ticket, mut unsupported) = (Ticket::default(), Vec::new());
@@ -207,15 +234,17 @@ fn document(request: &Request) -> Result<Packing, Response> {
     }
 }
 
-fn user(request: &Request) -> String {
-    request.operation("requesting-user-name").and_then(read_text).unwrap_or_else(|| "anonymous".into())
-}
-
-fn create(server: &Server, printer: &Preset, request: &Request, ticket: Ticket) -> Result<u32, Response> {
+fn create(
+    server: &Server,
+    place: &Place,
+    printer: &Preset,
+    request: &Request,
+    ticket: Ticket,
+) -> Result<u32, Response> {
     let named =
         |attribute: &str| request.operation(attribute).and_then(read_text).filter(|name| !name.is_empty());
     let name = named("job-name").or_else(|| named("document-name")).unwrap_or_else(|| "Untitled".into());
-    server.create(printer, &name, &user(request), ticket).map_err(|error| failed(request, &error))
+    server.create(printer, &name, owner(place, request), ticket).map_err(|error| failed(request, &error))
 }
 
 /// Judges a request that may have a document, before the document is read.
@@ -227,10 +256,10 @@ pub fn begin(server: &Server, place: &Place, request: &Request) -> Result<Incomi
     if operation(request) == Some(Operation::PrintJob) {
         let (printer, _) = target(server, place, request)?;
         let (ticket, unsupported) = ticket(request)?;
-        let job = create(server, printer, request, ticket)?;
+        let job = create(server, place, printer, request, ticket)?;
         return Ok(Incoming { job, packing, is_last: true, is_own: true, unsupported });
     }
-    let job = job_of(server, place, request)?;
+    let job = own_job(server, place, request)?;
     let is_last = match request.operation("last-document") {
         Some(IppValue::Boolean(last)) => *last,
         _ => {
@@ -369,7 +398,7 @@ fn answered(server: &Server, place: &Place, request: &Request) -> Result<Respons
         Operation::CreateJob => {
             let (printer, _) = target(server, place, request)?;
             let (ticket, unsupported) = ticket(request)?;
-            let id = create(server, printer, request, ticket)?;
+            let id = create(server, place, printer, request, ticket)?;
             Ok(job_answer(server, place, request, id, &unsupported))
         }
         Operation::GetPrinterAttributes => {
@@ -394,17 +423,17 @@ fn answered(server: &Server, place: &Place, request: &Request) -> Result<Respons
             }
             Ok(response)
         }
-        Operation::CancelJob => change(server.cancel(job_of(server, place, request)?)),
-        Operation::HoldJob => change(server.hold(job_of(server, place, request)?)),
-        Operation::ReleaseJob => change(server.release(job_of(server, place, request)?)),
+        Operation::CancelJob => change(server.cancel(own_job(server, place, request)?)),
+        Operation::HoldJob => change(server.hold(own_job(server, place, request)?)),
+        Operation::ReleaseJob => change(server.release(own_job(server, place, request)?)),
         Operation::CloseJob => {
-            let id = job_of(server, place, request)?;
+            let id = own_job(server, place, request)?;
             let is_open = server.data().jobs.get(&id).is_some_and(|job| job.state == State::Incoming);
             if is_open { change(server.arrived(id)) } else { Ok(ok()) }
         }
         Operation::CancelMyJobs | Operation::CancelJobs => {
             let (printer, _) = target(server, place, request)?;
-            let mine = user(request);
+            let mine = owner(place, request);
             let asked: Option<Vec<u32>> = request.operation("job-ids").map(|ids| {
                 let number = |id: &IppValue| match id {
                     IppValue::Integer(id) => u32::try_from(*id).ok(),
@@ -412,7 +441,11 @@ fn answered(server: &Server, place: &Place, request: &Request) -> Result<Respons
                 };
                 each(ids).iter().filter_map(number).collect()
             });
-            let theirs = |job: &Job| job.printer == printer.name && job.user == mine;
+            let is_owner = |job: &Job| match place.may_change {
+                true => job.owner.user == mine.user,
+                false => job.owner == mine,
+            };
+            let theirs = |job: &Job| job.printer == printer.name && is_owner(job);
             let jobs: Vec<u32> = {
                 let data = server.data();
                 if let Some(asked) = &asked
@@ -462,7 +495,8 @@ fn get_jobs(server: &Server, place: &Place, request: &Request) -> Result<Respons
             return Err(response);
         }
     };
-    let mine = matches!(request.operation("my-jobs"), Some(IppValue::Boolean(true))).then(|| user(request));
+    let mine = matches!(request.operation("my-jobs"), Some(IppValue::Boolean(true)))
+        .then(|| owner(place, request).user);
     let limit = match request.operation("limit") {
         Some(IppValue::Integer(limit)) => usize::try_from(*limit).unwrap_or(usize::MAX),
         _ => usize::MAX,
@@ -471,7 +505,7 @@ fn get_jobs(server: &Server, place: &Place, request: &Request) -> Result<Respons
     let fits = |job: &&Job| {
         job.printer == printer.name
             && is_over.is_none_or(|over| job.state.is_over() == over)
-            && mine.as_ref().is_none_or(|mine| job.user == *mine)
+            && mine.as_ref().is_none_or(|mine| job.owner.user == *mine)
     };
     let data = server.data();
     let mut jobs: Vec<&Job> = data.jobs.values().filter(fits).collect();
@@ -494,127 +528,4 @@ fn add_job(response: &mut Response, attributes: Vec<(&'static str, IppValue)>, w
             response.add(DelimiterTag::JobAttributes, name, value);
         }
     }
-}
-
-/// The attributes that a client wants to see.
-pub struct Wanted(Vec<String>);
-
-impl Wanted {
-    fn of(request: &Request, usual: &[&str]) -> Wanted {
-        Wanted(match request.operation("requested-attributes") {
-            Some(value) => each(value).iter().filter_map(read_text).collect(),
-            None => usual.iter().map(ToString::to_string).collect(),
-        })
-    }
-
-    fn has(&self, name: &str, group: &str) -> bool {
-        // The table of all sheets is long, and is given to whoever names it.
-        let by_group = name != "media-col-database";
-        self.0.iter().any(|wanted| wanted == name || by_group && (wanted == "all" || wanted == group))
-    }
-}
-
-/// What of a job is as its owner wants it.
-const TEMPLATE: [&str; 9] = [
-    "copies",
-    "media",
-    "media-col",
-    "page-ranges",
-    "print-quality",
-    "print-content-optimize",
-    "print-rendering-intent",
-    "print-color-mode",
-    "sides",
-];
-
-/// A reason that stops a job, as its own.
-fn stops(reason: Reason) -> bool {
-    !matches!(reason, Reason::SupplyMissing)
-}
-
-/// The state of a job in numbers, and its reasons.
-pub fn state(data: &Data, job: &Job) -> (i32, Vec<&'static str>) {
-    match job.state {
-        State::Incoming => (4, vec!["job-incoming"]),
-        State::Pending => (3, vec!["none"]),
-        State::Held if job.ticket.held && job.begun.is_none() => (4, vec!["job-hold-until-specified"]),
-        State::Held => (4, vec!["job-held-on-create"]),
-        State::Processing if job.cancel => (5, vec!["processing-to-stop-point"]),
-        State::Processing if data.reasons.iter().any(|&reason| stops(reason)) => {
-            (6, vec!["printer-stopped", "job-printing"])
-        }
-        State::Processing if job.sheets.is_none() => (5, vec!["job-transforming"]),
-        State::Processing => (5, vec!["job-printing"]),
-        State::Canceled => (7, vec!["job-canceled-by-user"]),
-        State::Aborted => (8, vec!["aborted-by-system"]),
-        State::Completed => (9, vec!["job-completed-successfully"]),
-    }
-}
-
-/// Seconds the printer had been up at a moment; what was before its start is 0.
-fn up(server: &Server, moment: Option<u64>) -> IppValue {
-    let began = now().saturating_sub(server.started.elapsed().as_secs());
-    moment.map_or(IppValue::NoValue, |moment| integer(moment.saturating_sub(began)))
-}
-
-/// All that can be known of a job.
-pub fn attributes(
-    server: &Server,
-    data: &Data,
-    place: &Place,
-    job: &Job,
-    uuid: &str,
-) -> Vec<(&'static str, IppValue)> {
-    let (number, reasons) = state(data, job);
-    let date = |moment: Option<u64>| moment.map_or(IppValue::NoValue, date_time);
-    let printer = place.printer(&job.printer);
-    let sheets = job.sheets.map_or(IppValue::NoValue, integer);
-    let before = data.jobs.values().filter(|other| !other.state.is_over() && other.id < job.id).count();
-    let ticket = &job.ticket;
-    let word = |word: &Option<String>, usual: &str| keyword(word.as_deref().unwrap_or(usual));
-    let mut all = vec![
-        ("job-id", integer(job.id)),
-        ("job-uri", uri(&format!("{printer}/{}", job.id))),
-        ("job-uuid", uri(&format!("urn:uuid:{uuid}"))),
-        ("job-printer-uri", uri(&printer)),
-        ("job-more-info", uri(&place.page(""))),
-        ("job-name", name(&job.name)),
-        ("job-originating-user-name", name(&job.user)),
-        ("job-state", IppValue::Enum(number)),
-        ("job-state-reasons", keywords(reasons)),
-        ("job-state-message", text(&job.message)),
-        ("number-of-documents", integer(i32::from(job.document.is_some()))),
-        ("document-format-supplied", crate::values::mime(&job.format)),
-        ("job-k-octets", integer(job.octets.div_ceil(1024))),
-        ("job-impressions", sheets.clone()),
-        ("job-impressions-completed", integer(job.done)),
-        ("job-media-sheets", sheets),
-        ("job-media-sheets-completed", integer(job.done)),
-        ("job-printer-up-time", integer(server.started.elapsed().as_secs() + 1)),
-        ("time-at-creation", up(server, Some(job.created))),
-        ("time-at-processing", up(server, job.begun)),
-        ("time-at-completed", up(server, job.ended)),
-        ("date-time-at-creation", date(Some(job.created))),
-        ("date-time-at-processing", date(job.begun)),
-        ("date-time-at-completed", date(job.ended)),
-        ("number-of-intervening-jobs", integer(before)),
-        ("copies", integer(ticket.copies)),
-        ("sides", keyword("one-sided")),
-        ("print-quality", IppValue::Enum(ticket.quality.unwrap_or(4))),
-        ("print-content-optimize", word(&ticket.content, AUTO)),
-        ("print-rendering-intent", word(&ticket.intent, AUTO)),
-        ("print-color-mode", word(&ticket.colour, AUTO)),
-    ];
-    let loaded = data.loaded();
-    let size = ticket.size.unwrap_or(loaded.size);
-    let kind = ticket.kind.as_deref().unwrap_or(&loaded.kind);
-    all.push(("media", keyword(&keyword_of(size))));
-    all.push(("media-col", printer::media_col(size, Some(kind))));
-    if !ticket.pages.is_empty() {
-        all.push(("page-ranges", list(ticket.pages.iter().map(|&(from, to)| range(from, to)))));
-    }
-    if let Some(percent) = data.percent.filter(|_| job.state == State::Processing) {
-        all.push(("job-media-progress", integer(percent)));
-    }
-    all
 }

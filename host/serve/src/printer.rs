@@ -8,12 +8,13 @@
 
 use ipp::value::IppValue;
 
+use crate::advert::title;
 use crate::operations::{OPERATIONS, Place};
 use crate::server::{Cartridge, Preset, Server, identity};
 use crate::spool::KINDS;
 use crate::template::{
-    AUTO, COLOURS, CONTENTS, INTENTS, MOST_COPIES, QUALITIES, RESOLUTIONS, SHEETS, Size, TYPES, keyword_of,
-    margins, paper, size, sizes,
+    AUTO, COLOURS, CONTENTS, INTENTS, MOST_COPIES, OVERRIDES, QUALITIES, RESOLUTIONS, SHEETS, Size, TYPES,
+    keyword_of, margins, paper, size, sizes,
 };
 use crate::values::{
     charset, collection, date_time, dpi, integer, keyword, keywords, language, list, long_text, mime, name,
@@ -187,7 +188,7 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
         (D, "printer-config-change-time", integer(data.configured.saturating_sub(began))),
         (D, "printer-current-time", date_time(crate::values::now())),
         (D, "printer-device-id", long_text(DEVICE_ID)),
-        (D, "printer-dns-sd-name", name(&format!("ALPS {}", preset.name))),
+        (D, "printer-dns-sd-name", name(&title(&preset.name, server.settings.computer()))),
         (D, "printer-geo-location", unknown()),
         (D, "printer-get-attributes-supported", keyword("document-format")),
         (D, "printer-icons", uri(&place.page("icon.png"))),
@@ -311,7 +312,7 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
         (T, "orientation-requested-supported", IppValue::Enum(3)),
         (T, "output-bin-default", keyword("face-up")),
         (T, "output-bin-supported", keyword("face-up")),
-        (T, "overrides-supported", keywords(["document-number", "pages"])),
+        (T, "overrides-supported", keywords(OVERRIDES)),
         (T, "page-ranges-supported", IppValue::Boolean(true)),
         (T, "print-color-mode-default", keyword(AUTO)),
         (T, "print-color-mode-supported", keywords(COLOURS)),

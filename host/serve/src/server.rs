@@ -13,7 +13,7 @@ use inks::Library;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
-use crate::jobs::{Job, State, Store, StoreError, after_restart};
+use crate::jobs::{Job, Owner, State, Store, StoreError, after_restart};
 use crate::template::{Size, TYPES, Ticket, paper, size};
 use crate::values::now;
 use device::connection::Destination;
@@ -53,6 +53,13 @@ pub struct Settings {
     pub hosts: Vec<String>,
     /// What somebody elsewhere has to know to change things.
     pub code: String,
+}
+
+impl Settings {
+    /// The name of this computer, without a domain.
+    pub fn computer(&self) -> &str {
+        self.hosts.first().map_or("localhost", |name| name.split('.').next().unwrap_or(name))
+    }
 }
 
 /// What a cartridge says of itself.
@@ -260,7 +267,7 @@ impl Server {
         &self,
         printer: &Preset,
         name: &str,
-        user: &str,
+        owner: Owner,
         ticket: Ticket,
     ) -> Result<u32, ChangeError> {
         let mut data = self.data();
@@ -272,7 +279,7 @@ impl Server {
             id,
             printer: printer.name.clone(),
             name: name.into(),
-            user: user.into(),
+            owner,
             ticket,
             document: None,
             format: "application/octet-stream".into(),

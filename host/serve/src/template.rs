@@ -73,6 +73,9 @@ const FIXED: [(&str, &str); 6] = [
     ("print-scaling", "auto"),
 ];
 
+/// `overrides-supported`: what an override may name. What it would change is not among it, so it changes nothing.
+pub const OVERRIDES: [&str; 2] = ["document-number", "pages"];
+
 /// Width and length of a sheet in hundredths of a millimetre, as IPP counts.
 pub type Size = (i32, i32);
 
@@ -269,8 +272,13 @@ impl Ticket {
             ("printer-resolution", IppValue::Resolution { cross_feed, feed, units: 3 }) => {
                 cross_feed == feed && RESOLUTIONS.iter().any(|&known| i32::from(known) == *feed)
             }
-            // Of pages by themselves nothing can be asked.
-            ("overrides", _) => false,
+            // Pages can be named, and nothing be asked of them.
+            ("overrides", value) => each(value).iter().all(|one| match one {
+                IppValue::Collection(members) => {
+                    members.iter().all(|(member, _)| OVERRIDES.contains(&member.as_str()))
+                }
+                _ => false,
+            }),
             _ => FIXED.iter().any(|&(known, only)| known == name && word().as_deref() == Some(only)),
         }
     }

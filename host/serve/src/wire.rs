@@ -277,22 +277,13 @@ fn put(attributes: &mut IppAttributes, tag: DelimiterTag, name: &str, value: Ipp
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use testing::ipp::{Attribute, message};
 
-    /// A request of attributes: tag, name, value.
-    fn request(attributes: &[(u8, &str, &[u8])]) -> Vec<u8> {
-        let mut bytes = vec![2, 0, 0, 11, 0, 0, 0, 7, 1];
-        for (tag, name, value) in attributes {
-            bytes.push(*tag);
-            for part in [name.as_bytes(), value] {
-                bytes.extend((part.len() as u16).to_be_bytes());
-                bytes.extend(part);
-            }
-        }
-        bytes.push(3);
-        bytes
+    fn request(attributes: &[Attribute<'_>]) -> Vec<u8> {
+        message(11, &[(1, attributes)])
     }
 
-    const BEGIN: [(u8, &str, &[u8]); 2] =
+    const BEGIN: [Attribute<'_>; 2] =
         [(0x47, "attributes-charset", b"utf-8"), (0x48, "attributes-natural-language", b"en")];
 
     #[test]
@@ -325,7 +316,7 @@ mod tests {
         ] {
             assert!(head(&request(&[wrong])).is_err(), "{wrong:?}");
         }
-        let deep: Vec<(u8, &str, &[u8])> =
+        let deep: Vec<Attribute<'_>> =
             (0..20).map(|level| (0x34, if level == 0 { "c" } else { "" }, &b""[..])).collect();
         assert!(head(&request(&deep)).is_err());
         let many = vec![(0x44, "a", &b"b"[..]); MOST_VALUES + 2];

@@ -305,6 +305,17 @@ pub fn yield_to_interrupt() {
     drop(scratch::folders());
 }
 
+type End = Box<dyn FnOnce() + Send>;
+
+static END: std::sync::Mutex<Option<End>> = std::sync::Mutex::new(None);
+
+/// What to do beside all else when the program is told to stop. It may end the program by itself, as a server does, which is always
+/// ended so.
+#[cfg(feature = "serve")]
+pub fn at_interrupt(end: impl FnOnce() + Send + 'static) {
+    *END.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(end));
+}
+
 /// Removes what is staged, and every other temporary folder, when the program is told to stop, which then ends with exit
 /// code 130.
 pub fn remove_on_interrupt() -> Result<()> {
@@ -321,6 +332,9 @@ pub fn remove_on_interrupt() -> Result<()> {
                     _ => break,
                 }
             }
+        }
+        if let Some(end) = END.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            end();
         }
         let farewell = FAREWELL.lock().unwrap_or_else(PoisonError::into_inner);
         let text = farewell.as_deref().unwrap_or("nothing unfinished is left behind");

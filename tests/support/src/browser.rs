@@ -1,6 +1,7 @@
 //! Scripts that drive a page in a real browser. `cargo xtask preview` brings browser and Node, and names them.
 
-use std::path::{Path, PathBuf};
+use std::ffi::OsStr;
+use std::path::PathBuf;
 use std::process::Command;
 
 use crate::needs::{self, Need};
@@ -19,13 +20,13 @@ impl Browser {
         Some(Browser { node, scripts: needs::path(Need::Browser, "FOILPRESS_BROWSER")? })
     }
 
-    /// Runs Node with these arguments for a page, or for the pages in a folder.
+    /// Runs Node with these arguments for a page, for the pages in a folder, or for those at an address.
     ///
     /// # Panics
     /// When it fails.
-    pub fn run(&self, args: &[&str], page: &Path) {
+    pub fn run(&self, args: &[&str], page: impl AsRef<OsStr>) {
         let mut command = Command::new(&self.node);
-        command.args(args).current_dir(&self.scripts).env("FOILPRESS_PAGE", page);
+        command.args(args).current_dir(&self.scripts).env("FOILPRESS_PAGE", page.as_ref());
         let status = command.status().expect("node runs");
         assert!(status.success(), "{args:?}: {status}");
     }
@@ -34,7 +35,7 @@ impl Browser {
     ///
     /// # Panics
     /// When one fails.
-    pub fn test(&self, script: &str, pattern: &str, page: &Path) {
+    pub fn test(&self, script: &str, pattern: &str, page: impl AsRef<OsStr>) {
         let pattern = format!("--test-name-pattern={pattern}");
         self.run(&["--test", "--test-reporter=spec", "--test-concurrency=1", &pattern, script], page);
     }

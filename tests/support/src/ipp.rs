@@ -16,19 +16,14 @@ pub const CANCEL: u16 = 8;
 /// Get-Job-Attributes.
 pub const JOB: u16 = 9;
 
-/// The bytes of a request: operation attributes, then those of the job.
-pub fn request(operation: u16, uri: &str, attributes: &[Attribute<'_>], job: &[Attribute<'_>]) -> Vec<u8> {
+/// The bytes of a message: groups of attributes, each behind its tag.
+pub fn message(operation: u16, groups: &[(u8, &[Attribute<'_>])]) -> Vec<u8> {
     let mut bytes = vec![2, 0];
     bytes.extend(operation.to_be_bytes());
-    bytes.extend([0, 0, 0, 1, 1]);
-    let begin: [Attribute<'_>; 3] = [
-        (0x47, "attributes-charset", b"utf-8"),
-        (0x48, "attributes-natural-language", b"en"),
-        (0x45, "printer-uri", uri.as_bytes()),
-    ];
-    for (group, attributes) in [(None, &begin[..]), (None, attributes), (Some(2), job)] {
-        bytes.extend(group.filter(|_| !attributes.is_empty()));
-        for (tag, name, value) in attributes {
+    bytes.extend([0, 0, 0, 1]);
+    for (group, attributes) in groups {
+        bytes.push(*group);
+        for (tag, name, value) in *attributes {
             bytes.push(*tag);
             for part in [name.as_bytes(), value] {
                 bytes.extend((part.len() as u16).to_be_bytes());
@@ -38,6 +33,17 @@ pub fn request(operation: u16, uri: &str, attributes: &[Attribute<'_>], job: &[A
     }
     bytes.push(3);
     bytes
+}
+
+/// The bytes of a request: operation attributes, then those of the job.
+pub fn request(operation: u16, uri: &str, attributes: &[Attribute<'_>], job: &[Attribute<'_>]) -> Vec<u8> {
+    let begin: [Attribute<'_>; 3] = [
+        (0x47, "attributes-charset", b"utf-8"),
+        (0x48, "attributes-natural-language", b"en"),
+        (0x45, "printer-uri", uri.as_bytes()),
+    ];
+    let groups = [(1, &[&begin, attributes].concat()[..]), (2, job)];
+    message(operation, if job.is_empty() { &groups[..1] } else { &groups })
 }
 
 /// An HTTP answer: its code and its body.

@@ -27,11 +27,13 @@ async function attempt(what) {
   await look();
 }
 
+/** Whether the rows are other ones than before. */
 function fill(select, rows, chosen) {
   const words = JSON.stringify(rows);
-  if (select.dataset.rows === words) return;
+  if (select.dataset.rows === words) return false;
   select.dataset.rows = words;
   select.replaceChildren(...rows.map(([value, label]) => new Option(label, value, false, value === chosen)));
+  return true;
 }
 
 function button(label, name, act) {
@@ -69,6 +71,10 @@ function show(about) {
   if (state.percent !== null) at("progress").value = state.percent;
   slots(about.cartridges);
   fill(at("printer"), about.printers.map(({ name, about: words }) => [name, `${name}: ${words}`]));
+  if (fill(at("which"), about.charts.map(({ name, label }) => [name, label]))) {
+    about.charts.forEach((chart, place) => { at("which").options[place].dataset.look = chart.look; });
+    at("look").textContent = about.charts[0].look;
+  }
   fill(at("size"), about.sizes.map(({ keyword, label }) => [keyword, label]), about.loaded.size);
   fill(at("kind"), about.types.map(({ keyword, label }) => [keyword, label]), about.loaded.kind);
   const jobs = JSON.stringify(about.jobs);
@@ -98,12 +104,15 @@ async function look() {
   }
 }
 
-async function take(file) {
-  const printer = at("printer").value;
-  const { job } = JSON.parse(await post("/desk/print", { printer, name: file.name }, file));
+/** A document or a chart becomes a job that is held; what it takes is shown. */
+async function propose(path, parameters, file) {
   at("plan-words").textContent = "Drawing…";
+  at("passes").replaceChildren();
+  at("preview").removeAttribute("src");
   at("plan").hidden = false;
+  planned = 0;
   try {
+    const { job } = JSON.parse(await post(path, { printer: at("printer").value, ...parameters }, file));
     const plan = JSON.parse(await post("/desk/plan", { job }));
     planned = job;
     at("plan-words").textContent = `${plan.sheets} sheet${plan.sheets === 1 ? "" : "s"}; the first one takes these passes. ${plan.note}`;
@@ -116,17 +125,26 @@ async function take(file) {
   } catch (error) {
     at("plan").hidden = true;
     throw error;
+  } finally {
+    // The same file can be chosen again.
+    at("file").value = "";
   }
 }
 
 async function settle(path) {
   const job = planned;
+  if (job === 0) return;
   at("plan").hidden = true;
-  at("file").value = "";
   await post(path, { job });
 }
 
+const take = (file) => propose("/desk/print", { name: file.name }, file);
 at("file").addEventListener("change", () => at("file").files[0] && attempt(() => take(at("file").files[0])));
+at("which").addEventListener("change", () => { at("look").textContent = at("which").selectedOptions[0].dataset.look; });
+at("chart").addEventListener("submit", (event) => {
+  event.preventDefault();
+  attempt(() => propose("/desk/chart", { chart: at("which").value }));
+});
 for (const kind of ["dragover", "dragleave", "drop"]) {
   at("drop").addEventListener(kind, (event) => {
     event.preventDefault();

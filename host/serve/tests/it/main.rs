@@ -1,8 +1,12 @@
 //! The server as its clients see it: over a socket.
 
+mod advert;
+mod browser;
 mod clients;
 mod desk;
+mod devices;
 mod limits;
+mod rights;
 
 use std::net::{SocketAddr, TcpListener};
 use std::path::PathBuf;

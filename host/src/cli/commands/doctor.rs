@@ -1,6 +1,8 @@
 //! `foilpress doctor`: what printing needs, what is missing, and what to do next.
 
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, TcpStream};
 use std::path::Path;
+use std::time::Duration;
 
 use anyhow::{Error, Result, bail};
 use clap::Args as ClapArgs;
@@ -8,6 +10,7 @@ use serde_json::{Value, json};
 
 use crate::cli::commands::bridge::{Found, ask};
 use crate::cli::commands::resume::{as_json, line};
+use crate::cli::commands::serve::{self, Running};
 use crate::cli::console::{chain, permission, show, stdout};
 use device::connection::find::{self, Candidate};
 use device::connection::{Address, OpenError};
@@ -56,8 +59,7 @@ struct Visit<W> {
 /// Runs `doctor`. Fails if something prevents printing.
 pub fn run(args: &Args) -> Result<()> {
     let out: Box<dyn std::io::Write> = if args.json { Box::new(std::io::sink()) } else { Box::new(stdout()) };
-    let found =
-        json!({ "jobs_folder": null, "unfinished_jobs": [], "boards_in_boot_loader": 0, "bridges": [] });
+    let found = json!({ "jobs_folder": null, "unfinished_jobs": [], "boards_in_boot_loader": 0, "bridges": [], "print_servers": [] });
     let mut visit = Visit { out, troubles: Vec::new(), found, forbidden: false };
     visit.journal()?;
     let bridges = match &args.to {
@@ -76,6 +78,7 @@ pub fn run(args: &Args) -> Result<()> {
         visit.bridge(bridge)?;
     }
     visit.raw_device()?;
+    visit.server()?;
     visit.end(args.json)
 }
 
@@ -196,6 +199,45 @@ impl<W: std::io::Write> Visit<W> {
                     self.forbidden |= error.kind() == std::io::ErrorKind::PermissionDenied;
                     writeln!(out, "\n{place} cannot be opened: {error}")?;
                 }
+            }
+        }
+        Ok(())
+    }
+
+    /// The print server of this user, and the one of the system.
+    fn server(&mut self) -> Result<()> {
+        const PATIENCE: Duration = Duration::from_secs(2);
+        for folder in [serve::folder()?, Path::new("/var/lib/foilpress-serve").to_path_buf()] {
+            let running = match Running::find(&folder) {
+                Ok(None) => continue,
+                Ok(Some(running)) => running,
+                Err(error) => {
+                    writeln!(self.out, "\nprint server with its jobs in {}: {error}", folder.display())?;
+                    continue;
+                }
+            };
+            let Running { desk, listens, printers, announced } = &running;
+            let who = running.who();
+            // Where it listens on all addresses, this computer is one of them.
+            let ip = match listens.ip() {
+                IpAddr::V6(ip) if ip.is_unspecified() => IpAddr::V6(Ipv6Addr::LOCALHOST),
+                IpAddr::V4(ip) if ip.is_unspecified() => IpAddr::V4(Ipv4Addr::LOCALHOST),
+                ip => ip,
+            };
+            let answers = TcpStream::connect_timeout(&(ip, listens.port()).into(), PATIENCE);
+            writeln!(
+                self.out,
+                "\nprint server at {desk}\n    printers: {}\n    may print: {who}\n    in print dialogs: {announced}\n    \
+                 encrypted: with the certificate {}",
+                printers.join(" "),
+                folder.join("certificate.pem").display(),
+            )?;
+            push(
+                &mut self.found["print_servers"],
+                json!({ "desk": desk, "printers": printers, "may_print": who, "announced": announced, "answers": answers.is_ok() }),
+            );
+            if let Err(error) = answers {
+                self.trouble(&format!("    it does not answer: {error}"))?;
             }
         }
         Ok(())

@@ -3,13 +3,16 @@
 //! The server itself is behind the feature `serve`, for its libraries are many, and whoever builds this program to print one file needs
 //! none of them. The command line is the same without it.
 
+use std::fs::File;
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Args as ClapArgs;
+use serde::{Deserialize, Serialize};
 
 use device::connection::Destination;
+use device::transit::journal::Journal;
 
 /// Arguments of `serve`.
 #[derive(ClapArgs, Debug)]
@@ -29,8 +32,8 @@ pub struct Args {
     pub listen: SocketAddr,
     /// Listen on all addresses of this computer, so that other devices can print
     ///
-    /// Everyone who reaches this computer can print then. To change the loaded sheet, or to cancel a job, other devices
-    /// need the code that is shown in the terminal.
+    /// Everyone who reaches this computer can print then, and print dialogs find the printers. To change the loaded sheet, or to
+    /// cancel a job of somebody else, other devices need the code that is shown in the terminal.
     #[arg(long)]
     pub share: bool,
     /// Install the server as a service of the system that is found by print dialogs, with your presets (as root)
@@ -47,6 +50,53 @@ pub struct Args {
     /// Your own ink library: its folder, or the name it was added under [default: the built-in library]
     #[arg(long, value_name = "LIBRARY")]
     pub library: Option<PathBuf>,
+}
+
+/// What a server tells of itself while it runs, in a file beside its jobs.
+#[derive(Serialize, Deserialize, Debug, PartialEq)]
+pub struct Running {
+    /// The desk.
+    pub desk: String,
+    /// Where it listens.
+    pub listens: SocketAddr,
+    /// Addresses of its printers.
+    pub printers: Vec<String>,
+    /// Whether print dialogs of other computers find it, in words.
+    pub announced: String,
+}
+
+impl Running {
+    /// What the server says that keeps its jobs in this folder; `None` if none runs there.
+    ///
+    /// # Errors
+    /// The folder cannot be looked into, or there is a server that has not said it yet.
+    pub fn find(folder: &Path) -> std::io::Result<Option<Running>> {
+        let lock = match File::open(folder.join("lock")) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            lock => lock?,
+        };
+        if lock.try_lock_shared().is_ok() {
+            return Ok(None);
+        }
+        let text = std::fs::read(folder.join(RUNNING))?;
+        Ok(Some(serde_json::from_slice(&text)?))
+    }
+
+    /// Who may print.
+    pub fn who(&self) -> &'static str {
+        match self.listens.ip().is_loopback() {
+            true => "this computer only (--share is for all)",
+            false => "everyone who reaches this computer",
+        }
+    }
+}
+
+/// The file of [`Running`].
+const RUNNING: &str = "running.json";
+
+/// The folder of the jobs of a user's server.
+pub fn folder() -> Result<PathBuf> {
+    Ok(Journal::of_user()?.folder().join("serve"))
 }
 
 fn destination(text: &str) -> Result<(String, Destination), device::connection::NoDestination> {
@@ -71,6 +121,7 @@ mod with_server {
 
     use anyhow::{Context as _, bail};
     use clap::FromArgMatches as _;
+    use serve::advert::{Advert, has_avahi, is_real};
     use serve::http::{self, Limits};
     use serve::install::{Places, Service, UNIT};
     use serve::server::{Preset, Server, Settings, identities};
@@ -79,9 +130,10 @@ mod with_server {
     use super::*;
     use crate::cli::commands::{Command, preset};
     use crate::cli::console::{say, show};
+    use crate::cli::output;
     use device::printers::Printers;
-    use device::transit::journal::Journal;
-    use observe::{Observer, Silent};
+    use files::durable::{self, Access};
+    use observe::{Observer, Silent, with_causes};
 
     /// The printer that is always there.
     const STANDARD: &str = "standard";
@@ -114,7 +166,7 @@ mod with_server {
         }
         let folder = match &args.jobs {
             Some(folder) => folder.clone(),
-            None => Journal::of_user()?.folder().join("serve"),
+            None => super::folder()?,
         };
         let listen = match args.share {
             true => SocketAddr::from((Ipv6Addr::UNSPECIFIED, args.listen.port())),
@@ -150,10 +202,51 @@ mod with_server {
             text.push_str(&format!("code for changes from other devices: {}\n", settings.code));
         }
         let server = Arc::new(Server::begin(settings, Box::new(Terminal))?);
+        let (advert, announced) = announce(&server, address);
+        if !address.ip().is_loopback() {
+            text.push_str(&format!("in print dialogs: {announced}\n"));
+        }
+        let printer = |printer: &Preset| format!("ipp://{host}:{port}/ipp/print/{}", printer.name);
+        let running = Running {
+            desk: format!("http://{host}:{port}/"),
+            listens: address,
+            printers: server.settings.printers.iter().map(printer).collect(),
+            announced,
+        };
+        let told = server.settings.folder.join(RUNNING);
+        durable::write(&told, &serde_json::to_vec(&running)?, Access::Private)
+            .with_context(|| format!("cannot write {}", told.display()))?;
+        output::at_interrupt(move || {
+            drop(advert);
+            // What stays is the word of a server whose lock is gone.
+            let _ = std::fs::remove_file(&told);
+            say("foilpress: the server has ended; its jobs are kept");
+            std::process::exit(0);
+        });
         let printing = server.clone();
         std::thread::Builder::new().name("printing".into()).spawn(move || worker::work(&printing))?;
         show(&text)?;
         Ok(http::run(&server, vec![listener], Limits::default())?)
+    }
+
+    /// Announces the printers to other computers, if those can reach them; and what came of it.
+    fn announce(server: &Server, address: SocketAddr) -> (Option<Advert>, String) {
+        if address.ip().is_loopback() {
+            return (None, "no, the server listens on this computer only".into());
+        }
+        if has_avahi() {
+            return (
+                None,
+                "by Avahi, if `sudo foilpress serve --install` has told it of the printers".into(),
+            );
+        }
+        let uuid = |printer: &Preset| server.uuid(&format!("printer {}", printer.name));
+        let printers: Vec<(Preset, String)> =
+            server.settings.printers.iter().map(|printer| (printer.clone(), uuid(printer))).collect();
+        match Advert::begin(&printers, server.settings.computer(), address.port(), is_real) {
+            Ok(advert) => (Some(advert), "yes, while the server runs".into()),
+            Err(error) => (None, format!("no: {}", with_causes(&error))),
+        }
     }
 
     /// Tells the system about the service.

@@ -107,6 +107,32 @@ fn three_ways_to_print_a_document_make_the_same_job() {
     }
 }
 
+/// `doctor` finds a server that runs, and none that has ended; a server that is told to end does so, and says it.
+#[cfg(unix)]
+#[test]
+fn doctor_knows_the_server() {
+    let bench = Bench::new();
+    let servers = || {
+        // Without a bridge all is not well, which is not what is asked here.
+        let output = bench.command("doctor --json").output().unwrap();
+        let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        found["print_servers"].as_array().unwrap().clone()
+    };
+    let mut serving = Serving::start(&bench, "file:sheets");
+    let [server] = &servers()[..] else { panic!("not one server") };
+    assert_eq!(server["printers"][0], format!("ipp://{}/ipp/print/standard", serving.address));
+    assert_eq!(server["answers"], true);
+    assert!(server["may_print"].as_str().unwrap().starts_with("this computer only"), "{server}");
+    assert!(server["announced"].as_str().unwrap().starts_with("no, "), "{server}");
+    let id = serving.child.id().to_string();
+    assert!(std::process::Command::new("kill").args(["-TERM", &id]).status().unwrap().success());
+    assert!(serving.child.wait().unwrap().success());
+    assert!(servers().is_empty());
+    // One that was killed leaves its word behind, which nobody believes.
+    Serving::start(&bench, "file:sheets").kill();
+    assert!(servers().is_empty());
+}
+
 /// The queue that CUPS makes of the server by itself, without a driver.
 #[test]
 fn a_driverless_queue_prints_what_is_drawn() {

@@ -1,0 +1,16 @@
+//! The desk in a real browser, on a desk and on a phone.
+
+use serve::http::Limits;
+use testing::browser::Browser;
+
+use super::Running;
+
+#[test]
+fn the_desk_works_in_a_browser() {
+    let Some(browser) = Browser::find() else { return };
+    let running = Running::start(Limits::default(), true);
+    browser.test("desk.test.mjs", ".", format!("http://{}/", running.address));
+    // What was printed there came out, and nothing else.
+    let kept = std::fs::read_dir(running.path("sheets")).unwrap().count();
+    assert_eq!(kept, 1);
+}
