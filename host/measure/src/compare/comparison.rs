@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::figures::{Errors, Factor};
+use super::passes::PassOff;
 
 /// A comparison: figures that do not depend on pictures.
 #[derive(Clone, Debug, Serialize)]
@@ -17,6 +18,8 @@ pub struct Comparison {
     pub lens: LensFigures,
     /// Each photograph.
     pub photos: Vec<PhotoFigures>,
+    /// Passes that lie beside their place.
+    pub passes: Vec<PassOff>,
     /// Root mean square of the photographs' errors.
     pub errors: Errors,
     /// What is doubtful, and what to do.
@@ -59,6 +62,8 @@ pub struct PhotoFigures {
     pub half_angles_deg: [f64; 2],
     /// Factor from the file's values, 0 to 1, to radiance under irradiance 1.
     pub scale: [f64; 3],
+    /// Standard deviation of what blurs the photograph, across and down the sheet.
+    pub blur_mm: [f64; 2],
     /// How far the paper at the marks deviates from the lamp's fall-off.
     pub paper_deviation: f64,
     /// Share of the compared spots that were seen and not clipped.

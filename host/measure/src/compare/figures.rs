@@ -4,7 +4,8 @@
 //! The error of each step is the root mean square difference over spots of a millimetre and three channels, relative to the root mean
 //! square of the first picture. The last step has two parts: what one factor for each stack and channel explains
 //! is inks that differ from the library at these angles, and the remainder is everything else: registration, lamp, noise.
-//! Factors are found by least squares over the spots. Their standard errors come from what remains, which neither needs to be alike
+//! Passes that lie beside their place ([`super::passes`]) are in the cover that factors are of, so what they do is in the remainder.
+//! Factors are found by least squares over the spots; none is negative. Their standard errors come from what remains, which neither needs to be alike
 //! everywhere nor independent between neighbours (White 1980; Conley 1999, with weights that fall to 0 at [`NEAR`] spots), and from how
 //! far the photograph's scale is known.
 //! Limits: errors of steps may cancel, so they do not add up to the whole; a lamp in the wrong place looks like inks.
@@ -110,6 +111,8 @@ pub(crate) struct Steps<'a> {
 pub(crate) struct Cover {
     pub(crate) shares: Vec<f32>,
     pub(crate) curves: Vec<Curve>,
+    /// Of stacks.
+    pub(crate) names: Vec<String>,
 }
 
 /// The light that each curve of a cover sends from each spot to the eye.
@@ -127,7 +130,7 @@ impl Cover {
             |(i, (light, shares))| {
                 let ([_, _, theta], irradiance) = lighting.at(window.spot(i));
                 for ((light, &share), curve) in light.iter_mut().zip(shares).zip(&self.curves) {
-                    if share > 0.0 {
+                    if share != 0.0 {
                         *light = curve.at(theta).map(|f| f * irradiance * f64::from(share));
                     }
                 }
@@ -165,11 +168,10 @@ fn rms(known: &[usize], value: impl Fn(usize, usize) -> f64) -> f64 {
     (sum / (3 * known.len().max(1)) as f64).sqrt()
 }
 
-/// The errors of a photograph and the factors of its stacks, whose names are given. `None` if no spot is known.
+/// The errors of a photograph and the factors of its stacks as they lie on the sheet. `None` if no spot is known.
 pub(crate) fn errors(
     steps: &Steps<'_>,
     lights: &Lights<'_>,
-    names: &[String],
     window: &ComparedArea,
     scale: [f64; 3],
 ) -> Option<(Errors, Vec<Factor>)> {
@@ -182,7 +184,7 @@ pub(crate) fn errors(
     let whole = rms(&known, |i, c| first[i][c]).max(1e-30);
     let between = |a: &Spots, b: &Spots| rms(&known, |i, c| a[i][c] - b[i][c]) / whole;
 
-    let (explained, factors) = fitted(steps, lights, names, window, &known, scale);
+    let (explained, factors) = fitted(steps, lights, window, &known, scale);
     let print = |i: usize, c: usize| photo(i, c) - steps.print[i][c];
     let errors = Errors {
         total: rms(&known, |i, c| photo(i, c) - first[i][c]) / whole,
@@ -199,12 +201,13 @@ pub(crate) fn errors(
 fn fitted(
     steps: &Steps<'_>,
     lights: &Lights<'_>,
-    names: &[String],
     window: &ComparedArea,
     known: &[usize],
     scale: [f64; 3],
 ) -> (Spots, Vec<Factor>) {
+    let names = &lights.cover.names;
     let n = names.len();
+    let registered = lights.sums();
     let mut added = vec![[0.0; 3]; steps.photo.len()];
     let mut factors: Vec<Factor> = (0..n)
         .map(|s| Factor {
@@ -222,7 +225,7 @@ fn fitted(
     for c in 0..3 {
         let (mut normal, mut right) = (vec![0.0; n * n], vec![0.0; n]);
         let mut whole = 0.0;
-        let off = |i: usize| steps.photo[i].map_or(0.0, |rgb| rgb[c] - steps.print[i][c]);
+        let off = |i: usize| steps.photo[i].map_or(0.0, |rgb| rgb[c] - registered[i][c]);
         for &i in known {
             whole += steps.print[i][c].powi(2);
             let light = lights.at_spot(i);
@@ -237,7 +240,7 @@ fn fitted(
             normal[s * n + s] += HELD * whole + 1e-30;
         }
         let Some(system) = Cholesky::new(&normal, n) else { continue };
-        let by = system.solve(&right);
+        let by = not_negative(&normal, &right, n).unwrap_or_else(|| system.solve(&right));
         let along =
             |i: usize, by: &[f64]| lights.at_spot(i).iter().zip(by).map(|(l, by)| l[c] * by).sum::<f64>();
         for &i in known {
@@ -265,6 +268,29 @@ fn fitted(
     factors.retain(|factor| factor.share >= TOLD);
     factors.sort_by(|a, b| b.share.total_cmp(&a.share));
     (added, factors)
+}
+
+/// Additions to factors of 1 that leave none below 0, by least squares: what would be is held at 0, and the others are solved again.
+fn not_negative(normal: &[f64], right: &[f64], n: usize) -> Option<Vec<f64>> {
+    let mut held = vec![false; n];
+    loop {
+        let (mut matrix, mut vector) = (normal.to_vec(), right.to_vec());
+        for s in (0..n).filter(|s| held[*s]) {
+            for a in 0..n {
+                vector[a] += normal[a * n + s];
+                matrix[a * n + s] = 0.0;
+                matrix[s * n + a] = 0.0;
+            }
+            matrix[s * n + s] = 1.0;
+        }
+        (0..n).filter(|s| held[*s]).for_each(|s| vector[s] = -1.0);
+        let by = Cholesky::new(&matrix, n)?.solve(&vector);
+        let below: Vec<usize> = (0..n).filter(|s| !held[*s] && by[*s] < -1.0).collect();
+        if below.is_empty() {
+            return Some(by);
+        }
+        below.into_iter().for_each(|s| held[s] = true);
+    }
 }
 
 /// The variance of a sum of values on a grid, those of neighbours not independent.
@@ -295,7 +321,6 @@ mod tests {
     struct Print {
         window: ComparedArea,
         lighting: Lighting,
-        names: [String; 2],
         cover: Cover,
     }
 
@@ -306,10 +331,10 @@ mod tests {
             Print {
                 window: ComparedArea::new([0.0, 0.0], [21.0, 21.0], 2.0),
                 lighting: Lighting { eye: [0.0, 0.0, 500.0], lamp: [200.0, 100.0, 500.0], middle: [0.0; 2] },
-                names: ["C".to_string(), "MS".to_string()],
                 cover: Cover {
                     shares: (0..400).flat_map(share).collect(),
                     curves: vec![curve(0.1), curve(0.3)],
+                    names: vec!["C".to_string(), "MS".to_string()],
                 },
             }
         }
@@ -329,7 +354,7 @@ mod tests {
         fn errors(&self, photo: &[Option<[f64; 3]>]) -> Option<(Errors, Vec<Factor>)> {
             let (lights, print) = (self.lights(), self.seen([1.0; 2]));
             let steps = Steps { document: None, print: &print, photo };
-            errors(&steps, &lights, &self.names, &self.window, [0.0; 3])
+            errors(&steps, &lights, &self.window, [0.0; 3])
         }
     }
 
@@ -411,10 +436,30 @@ mod tests {
         }
         for s in 0..2 {
             let ratio = (stated[s] / square[s]).sqrt();
-            println!("{}: scatter {:.5}, stated {:.5}", print.names[s], square[s].sqrt(), stated[s].sqrt());
-            assert!((0.85..1.15).contains(&ratio), "{}: {ratio}", print.names[s]);
+            println!(
+                "{}: scatter {:.5}, stated {:.5}",
+                print.cover.names[s],
+                square[s].sqrt(),
+                stated[s].sqrt()
+            );
+            assert!((0.85..1.15).contains(&ratio), "{}: {ratio}", print.cover.names[s]);
         }
         assert!(differ <= 12, "{differ} of 600 factors seem to differ");
+    }
+
+    /// Light that no factor explains asks for less than nothing of one stack: it gets nothing, and the other is what then fits best.
+    #[test]
+    fn no_factor_is_negative() {
+        let print = Print::new();
+        let photo: Vec<_> = print.seen([1.0, -0.5]).into_iter().map(Some).collect();
+        let (_, mut factors) = print.errors(&photo).unwrap();
+        factors.sort_by(|a, b| a.stack.cmp(&b.stack));
+        assert!(factors[1].factor.iter().all(|f| f.abs() < 1e-9), "{factors:?}");
+        // By the closed form of one unknown.
+        let (cyan, seen) = (print.seen([1.0, 0.0]), print.seen([1.0, -0.5]));
+        let of = |a: &Spots, b: &Spots| a.iter().zip(b).map(|(a, b)| a[1] * b[1]).sum::<f64>();
+        let want = of(&cyan, &seen) / of(&cyan, &cyan);
+        assert!((factors[0].factor[1] - want).abs() < 1e-6, "{factors:?} {want}");
     }
 
     #[test]

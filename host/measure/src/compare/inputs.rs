@@ -42,5 +42,7 @@ pub(super) struct SheetPhoto {
     pub light: usize,
     pub size: (usize, usize),
     pub bent: bool,
+    /// What blurs it, in mm of the sheet.
+    pub blur: [f64; 2],
     pub marks: Vec<(Mark, PrintedMark)>,
 }

@@ -3,15 +3,18 @@
 //! In the order of the data: [`CompareSetup`] says where lamps stood; `geometry::sheet_marks` finds the camera marks of the dots that were printed, and
 //! [`geometry::marks`](crate::geometry::marks) those of each photograph, which says whether it shows this sheet; [`geometry::pose`](crate::geometry::pose) solves for lens and
 //! poses; the paper around the marks, or a grey card, gives exposure and white balance; `picture` lays the
-//! photograph flat; `scenery` shows document, mixture and dots from the same place under the same lamp; `figures` compares them,
-//! and [`page`] shows all of it.
+//! photograph flat; `blur` says how sharp it is; `scenery` shows document, mixture and dots from the same place under the same lamp;
+//! `passes` finds which inks lie beside their place; `figures` compares, `doubts` thinks of the paper, and [`page`] shows all of it.
 //! Limits: a flat sheet; one lamp at a time, which is a point; no light from elsewhere, which looks like an error of the inks.
 
+mod blur;
 mod comparison;
+mod doubts;
 mod figures;
 mod flat;
 mod inputs;
 pub mod page;
+mod passes;
 pub(crate) mod picture;
 mod scenery;
 mod setup;
@@ -23,6 +26,7 @@ use observe::Observer;
 pub use comparison::{Comparison, LensFigures, PhotoFigures, Pictures};
 pub use figures::{Errors, Factor};
 pub use inputs::{ComparedDocument, ComparedPrint, space};
+pub use passes::PassOff;
 pub use setup::{Card, CompareSetup, White};
 
 use crate::MeasureError;
@@ -101,9 +105,29 @@ pub fn compare(
     }
     let scenery = Scenery::new(printed, area, middle, size, &shots[0], &camera)?;
     observer.begin("comparing", shots.len() as u64);
-    let (mut photos, mut pictures) = (Vec::new(), Vec::new());
+    let (mut looked, mut pictures) = (Vec::new(), Vec::new());
     for (i, shot) in shots.iter().enumerate() {
-        let (figures, drawn) = scenery.compared(shot, i, &camera, setup, observer)?;
+        let (look, drawn) = scenery.looked(shot, i, &camera, setup, observer)?;
+        looked.push(look);
+        pictures.push(drawn);
+        observer.advance(1);
+    }
+    observer.end();
+    let registration = scenery.registration(&shots, &looked);
+    let passes = registration.as_ref().map_or_else(Vec::new, |found| found.named(&scenery.passes));
+    if !passes.is_empty() {
+        let all: Vec<String> = passes.iter().map(PassOff::words).collect();
+        warnings.push(format!(
+            "passes that are off: {} of the camera marks; stacks are compared where they lie",
+            all.join("; ")
+        ));
+    }
+    if scenery.passes.inks.is_empty() {
+        warnings.push("passes that are off were not looked for: the sheet has more than 8 inks, or one that is printed twice".into());
+    }
+    let mut photos = Vec::new();
+    for (i, shot) in shots.iter().enumerate() {
+        let figures = scenery.compared(shot, i, &looked[i], &camera, registration.as_ref())?;
         if figures.paper_deviation > UNEVEN {
             warnings.push(format!(
                 "{}: the paper at the marks is off by up to {:.0} % from the fall-off of lamp {}; check its position_mm, and that no \
@@ -121,10 +145,10 @@ pub fn compare(
             ));
         }
         photos.push(figures);
-        pictures.push(drawn);
-        observer.advance(1);
     }
-    observer.end();
+    if setup.white == White::Paper {
+        warnings.extend(doubts::of_paper(&photos));
+    }
     let lens = LensFigures {
         focal_px: camera.lens.focal,
         focal_error: camera.uncertain_focal,
@@ -138,6 +162,7 @@ pub fn compare(
         size_mm: size,
         lens,
         photos,
+        passes,
         errors,
         warnings,
     };
@@ -172,13 +197,15 @@ fn read(path: &Path, setup: &CompareSetup, sheet: &SheetMarks) -> Result<SheetPh
         ));
     };
     let picture = Picture::read(path, setup.linear)?;
-    let marks = sheet.seen(path, &picture.grey())?;
+    let grey = picture.grey();
+    let marks = sheet.seen(path, &grey)?;
     Ok(SheetPhoto {
         path: path.to_path_buf(),
         name,
         light,
         size: (picture.width, picture.height),
         bent: picture.bent,
+        blur: blur::of_marks(&grey, &marks),
         marks,
     })
 }

@@ -26,6 +26,8 @@ pub(crate) struct Picture {
     full: f32,
     /// Whether a camera's tone curve had to be undone, which is not known exactly.
     pub(crate) bent: bool,
+    /// Whether values have 16 bits, of which nobody knows what they are: raw ones are proportional to light, others are not.
+    sixteen: bool,
 }
 
 impl Picture {
@@ -52,7 +54,19 @@ impl Picture {
             let problem = format!("{} x {} pixels; too small to find marks in", photo.width, photo.height);
             return Err(MeasureError::photo(path, problem));
         }
-        Ok(Picture { width: photo.width, height: photo.height, values, full, bent })
+        let sixteen = matches!(photo.values, Values::Sixteen(_));
+        Ok(Picture { width: photo.width, height: photo.height, values, full, bent, sixteen })
+    }
+
+    /// The picture of 16 bits as it would be if its values, which were taken to be proportional to light, had the curve of sRGB.
+    pub(crate) fn other_tones(mut self) -> Option<Picture> {
+        if self.bent || !self.sixteen {
+            return None;
+        }
+        self.values.par_iter_mut().for_each(|v| *v = undone(*v));
+        self.full = undone(self.full);
+        self.bent = true;
+        Some(self)
     }
 
     /// The picture as marks are found in it.

@@ -3,12 +3,12 @@
 //! Problem: a photograph has the camera's perspective, the lamp's fall-off and an exposure of its own.
 //! Method: the renderer of `view` shows document, mixture and dots from the camera's place under its lamp, prepared once for all
 //! photographs; the paper around the marks, or the middle step of a grey card, gives exposure and white balance. Both are laid flat.
-//! That is for looking. Figures compare spots: what covers a spot is counted once, over all dots, and lit for each photograph.
-//! Cost: three renderings a photograph. Limits: a lamp is a point.
+//! That is for looking. Figures compare spots: what covers a spot is counted over all dots, as blurred as the photograph is, and lit.
+//! Cost: three renderings and two counts a photograph. Limits: a lamp is a point.
 
 use std::f64::consts::PI;
 
-use appearance::brdf::{Table, reflectances};
+use appearance::brdf::reflectances;
 use appearance::factor::Factored;
 use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
@@ -20,8 +20,9 @@ use view::{Light, Lit, Renderer, Scene};
 
 use super::comparison::{PhotoFigures, Pictures};
 use super::figures::{self, Cover, Lighting, Scale, Spots, Steps};
-use super::flat::{ComparedArea, Flat};
+use super::flat::{ComparedArea, Covering, Flat};
 use super::inputs::{ComparedPrint, SheetPhoto, space};
+use super::passes::{Evidence, Passes, Registration};
 use super::picture::Picture;
 use super::setup::{Card, CompareSetup, White};
 use crate::MeasureError;
@@ -35,44 +36,59 @@ const QUALITY: u8 = 88;
 const DIFFERENCE: f64 = 0.3;
 
 /// What is compared, prepared once for all photographs.
-pub(super) struct Scenery {
+pub(super) struct Scenery<'a> {
     window: ComparedArea,
-    print: Shown,
-    document: Option<(Shown, Shown)>,
-    stacks: Vec<String>,
+    print: Lit,
+    pub(super) passes: Passes<'a>,
+    document: Option<[Shown<'a>; 2]>,
     paper: Curve,
 }
 
-/// A source to look at, and to count.
-struct Shown {
+/// A document to look at, and to count.
+struct Shown<'a> {
     lit: Lit,
-    cover: Cover,
+    factored: &'a Factored,
+    curves: Vec<Curve>,
 }
 
-impl Shown {
-    fn new(source: &Source<'_>, rows: &Table, window: &ComparedArea) -> Result<Shown, MeasureError> {
-        let metres = window.size.map(|side| side / 1000.0);
-        let longest = window.width.max(window.height).clamp(64, 2048);
-        let lit = Lit::new(source, metres, longest).map_err(view_error)?;
-        let shares = window.shares(source).unwrap_or_default();
-        let curves = rows.rows().map(|row| source.space().curve(row)).collect();
-        Ok(Shown { lit, cover: Cover { shares, curves } })
+impl Shown<'_> {
+    fn cover(&self, window: &ComparedArea, blur: [f64; 2]) -> Cover {
+        Cover {
+            shares: window.shares(&Covering::Factored(self.factored), blur, &window.rows()),
+            curves: self.curves.clone(),
+            names: Vec::new(),
+        }
     }
+}
+
+/// What a photograph shows, spot by spot, and what it should show.
+pub(super) struct Looked {
+    lighting: Lighting,
+    scale: Scale,
+    paper_deviation: f64,
+    seen: Vec<Option<[f64; 3]>>,
+    predicted: Spots,
+    document: Option<[Spots; 2]>,
+}
+
+fn lit(source: &Source<'_>, window: &ComparedArea) -> Result<Lit, MeasureError> {
+    let longest = window.width.max(window.height).clamp(64, 2048);
+    Lit::new(source, window.size.map(|side| side / 1000.0), longest).map_err(view_error)
 }
 
 fn view_error(error: impl std::fmt::Display) -> MeasureError {
     MeasureError::Scene(error.to_string())
 }
 
-impl Scenery {
+impl<'a> Scenery<'a> {
     pub(super) fn new(
-        printed: &ComparedPrint<'_>,
+        printed: &ComparedPrint<'a>,
         area: Area,
         middle: [f64; 2],
         size: [f64; 2],
         shot: &SheetPhoto,
         camera: &SolvedCamera,
-    ) -> Result<Scenery, MeasureError> {
+    ) -> Result<Scenery<'a>, MeasureError> {
         let ComparedPrint { sheet, library, document } = printed;
         let space = &space();
         // As fine as the photographs are.
@@ -85,28 +101,31 @@ impl Scenery {
         }
         let window = ComparedArea::new(middle, size, pixels);
         let rows = reflectances(sheet.stacks(), library, space);
-        let print = Shown::new(&Source::Print { dots: sheet, space, stacks: &rows, area }, &rows, &window)?;
-        let factored =
-            |factored: &Factored| Shown::new(&Source::Factored(factored), &factored.bases, &window);
+        let print = lit(&Source::Print { dots: sheet, space, stacks: &rows, area }, &window)?;
+        let factored = |factored: &'a Factored| -> Result<Shown<'a>, MeasureError> {
+            let source = Source::Factored(factored);
+            let curves = factored.bases.rows().map(|row| source.space().curve(row)).collect();
+            Ok(Shown { lit: lit(&source, &window)?, factored, curves })
+        };
         let document = match document {
-            Some(both) => Some((factored(both.document)?, factored(both.mapped)?)),
+            Some(both) => Some([factored(both.document)?, factored(both.mapped)?]),
             None => None,
         };
-        let stacks = sheet.stacks().iter().map(Stack::to_string).collect();
+        let passes = Passes::new(sheet, library, area);
         let bare = reflectances(&[Stack::SUBSTRATE], library, space);
         let paper = space.curve(bare.row(0));
-        Ok(Scenery { window, print, document, stacks, paper })
+        Ok(Scenery { window, print, passes, document, paper })
     }
 
-    /// One photograph beside its prediction.
-    pub(super) fn compared(
+    /// Looks at one photograph beside its prediction.
+    pub(super) fn looked(
         &self,
         shot: &SheetPhoto,
         number: usize,
         camera: &SolvedCamera,
         setup: &CompareSetup,
         observer: &dyn Observer,
-    ) -> Result<(PhotoFigures, Pictures), MeasureError> {
+    ) -> Result<(Looked, Pictures), MeasureError> {
         let (pose, lens) = (&camera.poses[number], &camera.lens);
         let window = &self.window;
         let lamp = setup.light[shot.light].position_mm;
@@ -118,45 +137,16 @@ impl Scenery {
             White::Card => card_scale(shot, &picture, &setup.card, &lighting, lens, pose)?,
         };
         let seen = picture.spots(window, lens, pose, scale.factor);
-        let lights = self.print.cover.lights(window, &lighting);
-        let predicted = lights.sums();
-        let document: Option<[Spots; 2]> = self.document.as_ref().map(|(document, mapped)| {
-            [document, mapped].map(|shown| shown.cover.lights(window, &lighting).sums())
-        });
-        let steps = Steps { document: document.as_ref(), print: &predicted, photo: &seen };
-        let Some((errors, stacks)) = figures::errors(&steps, &lights, &self.stacks, window, scale.error)
-        else {
-            return Err(MeasureError::Scene(format!(
-                "{}: all of the print is clipped or outside the picture; expose shorter, or show all of it",
-                shot.name
-            )));
-        };
-        let half: Vec<f64> = (0..seen.len()).map(|i| lighting.at(window.spot(i)).0[2].to_degrees()).collect();
-        let figures = PhotoFigures {
-            name: shot.name.clone(),
-            marks: shot.marks.len(),
-            camera_mm: pose.position(),
-            camera_error_mm: camera.uncertain_mm[number],
-            camera_axes: pose.rotation,
-            residual_px: camera.residuals[number],
-            light_mm: lamp,
-            angles_deg: lighting.at(window.middle).0.map(f64::to_degrees),
-            half_angles_deg: [
-                half.iter().copied().fold(90.0, f64::min),
-                half.iter().copied().fold(0.0, f64::max),
-            ],
-            scale: scale.factor,
-            paper_deviation,
-            seen: seen.iter().flatten().count() as f64 / seen.len() as f64,
-            errors,
-            stacks,
-        };
+        let sums = |cover: Cover| cover.lights(window, &lighting).sums();
+        let predicted = sums(self.passes.cover(window, shot.blur, None));
+        let document: Option<[Spots; 2]> = self
+            .document
+            .as_ref()
+            .map(|both| both.each_ref().map(|shown| sums(shown.cover(window, shot.blur))));
         let photo = picture.flat(window, lens, pose, scale.factor);
         let scene = self.scene(&lighting);
-        let render = |shown: &Shown| -> Result<Radiance, MeasureError> {
-            Renderer::new(&shown.lit)
-                .laid_flat(&scene, window.width, window.height, observer)
-                .map_err(view_error)
+        let render = |lit: &Lit| -> Result<Radiance, MeasureError> {
+            Renderer::new(lit).laid_flat(&scene, window.width, window.height, observer).map_err(view_error)
         };
         let print = render(&self.print)?;
         let tone = ToneCurve::of(std::slice::from_ref(&print));
@@ -166,11 +156,64 @@ impl Scenery {
             photo: draw(&radiance(&photo))?,
             print: draw(&print)?,
             document: match &self.document {
-                Some((document, mapped)) => Some((draw(&render(document)?)?, draw(&render(mapped)?)?)),
+                Some([document, mapped]) => {
+                    Some((draw(&render(&document.lit)?)?, draw(&render(&mapped.lit)?)?))
+                }
                 None => None,
             },
         };
-        Ok((figures, pictures))
+        Ok((Looked { lighting, scale, paper_deviation, seen, predicted, document }, pictures))
+    }
+
+    /// Where the passes are, if not where they should be.
+    pub(super) fn registration(&self, shots: &[SheetPhoto], looked: &[Looked]) -> Option<Registration> {
+        let evidence: Vec<Evidence<'_>> =
+            looked.iter().map(|look| Evidence { lighting: &look.lighting, seen: &look.seen }).collect();
+        let blur = [0, 1].map(|c| median(&mut shots.iter().map(|shot| shot.blur[c]).collect::<Vec<_>>()));
+        self.passes.solve(&self.window, blur, &evidence)
+    }
+
+    /// The figures of one photograph.
+    pub(super) fn compared(
+        &self,
+        shot: &SheetPhoto,
+        number: usize,
+        look: &Looked,
+        camera: &SolvedCamera,
+        registration: Option<&Registration>,
+    ) -> Result<PhotoFigures, MeasureError> {
+        let (window, Looked { lighting, seen, .. }) = (&self.window, look);
+        let cover = self.passes.cover(window, shot.blur, registration);
+        let lights = cover.lights(window, lighting);
+        let steps = Steps { document: look.document.as_ref(), print: &look.predicted, photo: seen };
+        let Some((errors, stacks)) = figures::errors(&steps, &lights, window, look.scale.error) else {
+            return Err(MeasureError::Scene(format!(
+                "{}: all of the print is clipped or outside the picture; expose shorter, or show all of it",
+                shot.name
+            )));
+        };
+        let half: Vec<f64> = (0..seen.len()).map(|i| lighting.at(window.spot(i)).0[2].to_degrees()).collect();
+        let pose = &camera.poses[number];
+        Ok(PhotoFigures {
+            name: shot.name.clone(),
+            marks: shot.marks.len(),
+            camera_mm: pose.position(),
+            camera_error_mm: camera.uncertain_mm[number],
+            camera_axes: pose.rotation,
+            residual_px: camera.residuals[number],
+            light_mm: lighting.lamp,
+            angles_deg: lighting.at(window.middle).0.map(f64::to_degrees),
+            half_angles_deg: [
+                half.iter().copied().fold(90.0, f64::min),
+                half.iter().copied().fold(0.0, f64::max),
+            ],
+            scale: look.scale.factor,
+            blur_mm: shot.blur,
+            paper_deviation: look.paper_deviation,
+            seen: seen.iter().flatten().count() as f64 / seen.len() as f64,
+            errors,
+            stacks,
+        })
     }
 
     /// The scene of a photograph, with its origin in the middle of the window, in metres.

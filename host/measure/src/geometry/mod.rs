@@ -14,3 +14,4 @@ pub mod pose;
 pub mod scene;
 pub(crate) mod shadow;
 pub(crate) mod sheet_marks;
+pub(crate) mod sides;

@@ -34,6 +34,10 @@ const FIRST: usize = 3;
 const AGREE: f64 = 0.03;
 /// A gap that its surroundings close but for this part of it is none.
 const OPEN: f64 = 0.25;
+/// Sizes that disagree about the dot gain so many times less with another tone curve say that the file has it, ...
+const BETTER: f64 = 2.0;
+/// ... if they disagree by this much, in um: less is within what sizes scatter by anyway.
+const SCATTER_UM: f64 = 0.4;
 /// Windows along the ramp, and the height of their middle part in dots.
 const TONES: usize = 20;
 const BAND: usize = 320;
@@ -160,7 +164,14 @@ pub fn measure(
     let mut seen: Vec<ScannedTones> = Vec::new();
     for path in scans {
         let scan = Scan::read(path, &marks, linear)?;
-        seen.push(chart.read(&scan, path)?);
+        scan.not_sharpened(path)?;
+        let tones = chart.read(&scan, path)?;
+        if linear.is_none()
+            && let Some(other) = scan.other_tones()
+        {
+            chart.not_bent(path, &tones, &chart.read(&other, path)?)?;
+        }
+        seen.push(tones);
         observer.advance(1);
     }
     observer.end();
@@ -262,6 +273,37 @@ impl<'a> RampChart<'a> {
         let patches = [row(0)?, row(1)?];
         let ramp = self.tones().into_par_iter().map(share).collect::<Result<_, _>>()?;
         Ok(ScannedTones { patches, ramp })
+    }
+
+    /// Refuses tones of 16 bits that fit their chart only if they are not proportional to light. A tone curve makes all clusters look larger or
+    /// smaller, but not alike: small ones have longer edges, hence another tone, and gaps stand at the other end of the curve.
+    fn not_bent(&self, path: &Path, plain: &ScannedTones, bent: &ScannedTones) -> Result<(), MeasureError> {
+        let windows =
+            [0, 1].map(|k| self.edges(k, &self.parts.clusters[k].iter().map(patch).collect::<Vec<_>>()));
+        let [plain, bent] = [plain, bent].map(|tones| self.disagreement(&windows, tones));
+        if plain > SCATTER_UM && plain > BETTER * bent {
+            let problem = format!(
+                "its 16 bits have a tone curve: clusters disagree by {plain:.1} um about the dot gain if values are proportional to light, and by \
+                 {bent:.1} um with the curve of sRGB; scan without a gamma, or give --linear false (or true, if you know better)"
+            );
+            return Err(MeasureError::photo(path, problem));
+        }
+        Ok(())
+    }
+
+    /// How far sizes that hold disagree about where edges lie, in um: root mean square.
+    fn disagreement(&self, windows: &[Vec<Edges>; 2], tones: &ScannedTones) -> f64 {
+        let mut reaches = Vec::new();
+        for (k, edges) in windows.iter().enumerate() {
+            let (own, other) = (&self.stacks[k].0, &self.stacks[1 - k].0);
+            let series = RampSeries::fit(own, other, edges, &tones.patches[k]);
+            let from = series.minimum_cluster.map_or(MOST - FIRST, |least| usize::from(least) - 1);
+            let sign = if k == 0 { 1.0 } else { -1.0 };
+            reaches.extend((from..MOST).map(|i| sign * reach(&[(&edges[i], tones.patches[k][i])])));
+        }
+        let mean = reaches.iter().sum::<f64>() / reaches.len() as f64;
+        let square = reaches.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / reaches.len() as f64;
+        square.sqrt() / DOTS_PER_MM * 1000.0
     }
 
     fn edges(&self, k: usize, windows: &[TonePatch]) -> Vec<Edges> {

@@ -17,12 +17,15 @@ use crate::geometry::grey::Grey;
 use crate::geometry::homography::Homography;
 use crate::geometry::marks::Mark;
 use crate::geometry::sheet_marks::SheetMarks;
-use crate::linalg::{Cholesky, spread};
+use crate::geometry::sides;
+use crate::linalg::{Cholesky, median, spread};
 
 /// The fewest pixels a millimetre: 150 dpi.
 const FEWEST_PIXELS: f64 = 5.5;
 /// Marks that lie farther than this from where a flat sheet has them, in mm, are not on one.
 const MOST_RESIDUAL: f64 = 0.3;
+/// Fringes beside the marks, as a share of the step from ink to paper, from which a scan was sharpened: an even blur makes none, noise less than a fifth.
+const FRINGE: f64 = 0.03;
 /// What is left out at the ends of a solid strip, in dots: blur and spreading ink reach that far.
 const INSET: usize = 16;
 /// Places of a solid strip, along it.
@@ -103,6 +106,33 @@ impl Scan {
             }
         }
         sums.map(|sum| sum / self.marks.len() as f64 * DOTS_PER_MM)
+    }
+
+    /// Refuses a scan whose program sharpened it: that makes the paper brighter beside ink, and ink darker beside paper, so tones of small
+    /// clusters are no mean of ink and paper.
+    pub(crate) fn not_sharpened(&self, path: &Path) -> Result<(), MeasureError> {
+        let fringe = |(_, profile): (usize, Vec<f64>)| {
+            let most = profile.iter().copied().fold(0.0, f64::max);
+            let least = profile.iter().copied().fold(1.0, f64::min);
+            (most - 1.0).max(-least)
+        };
+        let sides = self.marks.iter().flat_map(|(mark, _)| sides::profiles(&self.grey, mark));
+        let fringe = median(&mut sides.map(fringe).collect::<Vec<_>>());
+        if fringe > FRINGE {
+            let problem = format!(
+                "it was sharpened: beside the camera marks' sides are fringes of {:.0} % of the step from ink to paper; turn sharpening off in the \
+                 scanner's program, and scan again",
+                100.0 * fringe
+            );
+            return Err(MeasureError::photo(path, problem));
+        }
+        Ok(())
+    }
+
+    /// The same scan with its tones taken the other way, proportional to light or through the curve of sRGB; `None` where that is no question.
+    pub(crate) fn other_tones(mut self) -> Option<Scan> {
+        self.picture = self.picture.other_tones()?;
+        Some(self)
     }
 
     /// The pixel of a place in dots of the sheet.

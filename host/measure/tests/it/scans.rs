@@ -332,6 +332,57 @@ fn a_known_dot_gain_is_found_within_a_hundredth_and_the_smallest_cluster_exactly
     }
 }
 
+/// Scanner programs sharpen, and write 16 bits with the curve of sRGB: neither changes the dot gain in silence.
+#[test]
+fn sharpening_and_a_tone_curve_in_16_bits_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let sheet = chart_of("K", "substrate");
+    let bench = Bench { reach: 0.022, least: 6, ..Bench::for_ramp(&sheet, 300.0) };
+    let printed = Printed::new(sheet.dots(), "K", &bench);
+    let (width, height, plain) = scanned(&printed, None);
+    let measured = |path: PathBuf, linear: Option<bool>| {
+        ramp::measure(&[path], sheet.dots(), &Library::builtin(), linear, &Silent)
+    };
+    // Unsharp mask: what a mean over 5 x 5 pixels takes away is added again.
+    let mean = |x: usize, y: usize| {
+        let range = |at: usize, side: usize| at.saturating_sub(2)..(at + 3).min(side);
+        let all = range(y, height).flat_map(|y| range(x, width).map(move |x| (x, y)));
+        let (sum, count) = all.fold((0.0, 0.0f32), |(sum, n), (x, y)| (sum + plain[y * width + x], n + 1.0));
+        sum / count
+    };
+    let sharp = |amount: f32| -> Vec<f32> {
+        let value = |i: usize| plain[i] + amount * (plain[i] - mean(i % width, i / width));
+        (0..plain.len()).into_par_iter().map(value).collect()
+    };
+    let said = |found: Result<ramp::Ramp, measure::MeasureError>| found.unwrap_err().to_string();
+    let words = said(measured(saved(&folder, "sharp.png", &(width, height, sharp(0.5)), 1.0), None));
+    println!("{words}");
+    assert!(words.contains("sharpened") && words.contains("turn sharpening off"), "{words}");
+    // 16 bits, proportional to light and not.
+    let sixteen = |name: &str, coded: &(dyn Fn(f32) -> f32 + Sync)| {
+        let values: Vec<u16> =
+            plain.par_iter().map(|v| (65_535.0 * coded(v.clamp(0.0, 1.0))).round() as u16).collect();
+        let path = folder.path().join(name);
+        let picture: image::ImageBuffer<image::Luma<u16>, _> =
+            image::ImageBuffer::from_raw(width as u32, height as u32, values).unwrap();
+        picture.save(&path).unwrap();
+        path
+    };
+    let gamma = |v: f32| if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+    let (light, bent) = (sixteen("light.png", &|v| v), sixteen("bent.png", &gamma));
+    let words = said(measured(bent.clone(), None));
+    println!("{words}");
+    assert!(
+        words.contains("bent.png") && words.contains("tone curve") && words.contains("--linear false"),
+        "{words}"
+    );
+    for (path, linear) in [(light, None), (bent, Some(false))] {
+        let found = measured(path, linear).unwrap();
+        assert!((found.series[0].dot_gain_um / 22.0 - 1.0).abs() < 0.02, "{}", found.series[0].dot_gain_um);
+        assert_eq!(found.series[0].minimum_cluster, Some(6));
+    }
+}
+
 /// How much more than its dots ink covers in the middle of the ramp: places drawn by chance.
 fn half_tone(printed: &Printed<'_>) -> f64 {
     let parts = chart::ramp::parts();

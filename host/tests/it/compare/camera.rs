@@ -7,8 +7,9 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 use appearance::brdf::{Space, reflectances};
-use inks::{Curve, Library};
+use inks::{Curve, Library, Stack};
 use press::layout::Arranged;
+use protocol::ink::Ink;
 use rayon::prelude::*;
 
 pub type V = [f64; 3];
@@ -168,6 +169,8 @@ pub struct Sheet {
     pub library: Vec<Steps>,
     /// Whether a grey card lies beside it.
     card: bool,
+    /// The stack of each dot, where a pass lies beside its place.
+    moved: Option<Vec<u8>>,
 }
 
 /// Left and top of the grey card's three steps, one below the other, and their side, in mm.
@@ -207,7 +210,43 @@ impl Sheet {
         };
         let curves = plain.iter().enumerate().map(|(i, curve)| Steps::new(curve, factor(i))).collect();
         let library = plain.iter().map(|curve| Steps::new(curve, [1.0; 3])).collect();
-        Sheet { page, curves, bright, library, card }
+        Sheet { page, curves, bright, library, card, moved: None }
+    }
+
+    /// As predicted, but one ink lies so many dots to the right and down. It goes on top of what it then lies on.
+    pub fn with_pass_off(folder: &Path, ink: Ink, [right, down]: [i64; 2]) -> Sheet {
+        let mut sheet = Sheet::on(folder, [1.0; 3], [1.0; 3], false);
+        let dots = &sheet.page.sheet;
+        let (width, length) = (dots.width() as i64, dots.length() as i64);
+        let mut stacks = dots.stacks().to_vec();
+        let mut moved = Vec::with_capacity(dots.index().len());
+        for i in 0..dots.index().len() as i64 {
+            let (x, y) = (i % width - right, i / width - down);
+            let there = (0..width).contains(&x) && (0..length).contains(&y);
+            let from = if there { usize::from(dots.index()[(y * width + x) as usize]) } else { 0 };
+            let own = usize::from(dots.index()[i as usize]);
+            let (has, gets) = (stacks[own].layers().contains(&ink), stacks[from].layers().contains(&ink));
+            if has == gets {
+                moved.push(own as u8);
+                continue;
+            }
+            let mut layers: Vec<Ink> =
+                stacks[own].layers().iter().copied().filter(|own| *own != ink).collect();
+            if gets {
+                layers.push(ink);
+            }
+            let stack = Stack::new(layers);
+            let known = stacks.iter().position(|known| *known == stack);
+            moved.push(known.unwrap_or(stacks.len()) as u8);
+            if known.is_none() {
+                stacks.push(stack);
+            }
+        }
+        let space = Space::half_angle(512);
+        let rows = reflectances(&stacks[sheet.curves.len()..], &Library::builtin(), &space);
+        sheet.curves.extend(rows.rows().map(|row| Steps::new(&space.curve(row), [1.0; 3])));
+        sheet.moved = Some(moved);
+        sheet
     }
 
     /// The middle of the print in dots: that of its marks, which stand alike above and below.
@@ -238,7 +277,8 @@ impl Sheet {
         if i < 0.0 || j < 0.0 || i >= width || j >= length {
             return Some(0);
         }
-        Some(usize::from(self.page.sheet.index()[j as usize * self.page.sheet.width() + i as usize]))
+        let index = self.moved.as_deref().unwrap_or(self.page.sheet.index());
+        Some(usize::from(index[j as usize * self.page.sheet.width() + i as usize]))
     }
 }
 
@@ -292,4 +332,28 @@ pub fn photograph(sheet: &Sheet, shot: &Shot, exposure: f64, noise: bool) -> Pic
         })
         .collect();
     image::ImageBuffer::from_raw(width as u32, height as u32, values).unwrap()
+}
+
+/// The same through a lens out of focus: a normal distribution of so many pixels.
+pub fn out_of_focus(picture: &Picture, sigma: f64) -> Picture {
+    let reach = (3.5 * sigma).ceil() as i64;
+    let weights: Vec<f64> = (-reach..=reach).map(|k| (-0.5 * (k as f64 / sigma).powi(2)).exp()).collect();
+    let whole: f64 = weights.iter().sum();
+    let (width, height) = (picture.width() as i64, picture.height() as i64);
+    let mut values: Vec<f64> = picture.as_raw().iter().map(|v| f64::from(*v)).collect();
+    for [dx, dy] in [[1, 0], [0, 1]] {
+        values = (0..values.len() as i64)
+            .into_par_iter()
+            .map(|i| {
+                let (x, y, c) = (i / 3 % width, i / 3 / width, i % 3);
+                let at = |k: i64| {
+                    let (x, y) = ((x + k * dx).clamp(0, width - 1), (y + k * dy).clamp(0, height - 1));
+                    values[(3 * (y * width + x) + c) as usize]
+                };
+                (-reach..=reach).zip(&weights).map(|(k, weight)| weight * at(k)).sum::<f64>() / whole
+            })
+            .collect();
+    }
+    let values = values.into_iter().map(|v| v.round() as u16).collect();
+    image::ImageBuffer::from_raw(picture.width(), picture.height(), values).unwrap()
 }

@@ -10,7 +10,10 @@ mod truth;
 use std::fs;
 use std::path::Path;
 
-use camera::{BRIGHTER, FOCAL, Picture, RADIAL, RIGHT, SHOTS, Sheet, Shot, V, dot, minus, photograph};
+use camera::{
+    BRIGHTER, FOCAL, Picture, RADIAL, RIGHT, SHOTS, Sheet, Shot, V, dot, minus, out_of_focus, photograph,
+};
+use protocol::ink::Ink;
 use scenery::{CAMERA, PRINT, photographed};
 use serde_json::Value;
 use testing::program::Bench;
@@ -159,6 +162,47 @@ fn what_is_as_predicted_does_not_differ() {
         println!("{within} of {all} factors within two standard errors");
         assert_eq!(words.matches("no stack differs").count(), if darker { 0 } else { 2 }, "{words}");
         assert!(10 * within > 8 * all, "{within} of {all}");
+    }
+}
+
+/// A lens out of focus carries light of bright stacks to dark ones, and a pass that lies beside its place bares and doubles them: neither is an ink's.
+#[test]
+fn neither_focus_nor_register_is_taken_for_inks() {
+    let bench = bench(&[]);
+    let shots = [&SHOTS[0], &SHOTS[1]];
+    for (sigma, ink, off) in [(1.5, None, [0, 0]), (0.7, Some(Ink::Yellow), [3, -2])] {
+        let sheet = match ink {
+            Some(ink) => Sheet::with_pass_off(&bench.path("tile.sheet"), ink, off),
+            None => Sheet::with_stack(&bench.path("tile.sheet"), [1.0; 3]),
+        };
+        for shot in shots {
+            let picture = out_of_focus(&photograph(&sheet, shot, shot.exposure, false), sigma);
+            picture.save(bench.path("photos").join(shot.name)).unwrap();
+        }
+        let said = bench.done("compare photos --job job.rgl --camera camera.toml -q --json -o alone.html");
+        let report: Value = serde_json::from_str(&said).expect("JSON");
+        println!("{} {}", report["passes"], report["warnings"]);
+        for photo in report["photos"].as_array().unwrap() {
+            println!("{}: blur {}, {}", photo["name"], photo["blur_mm"], photo["errors"]);
+            for row in photo["stacks"].as_array().unwrap() {
+                let (value, error) = (vector(&row["factor"]), vector(&row["standard_error"]));
+                println!("  {} {value:.4?} ± {error:.4?} of {:.4}", row["stack"], number(&row["share"]));
+                assert_eq!(row["differs"], false, "{row}");
+                assert!(value.iter().all(|factor| *factor >= 0.0), "{row}");
+            }
+            let errors = &photo["errors"];
+            assert!(number(&errors["inks"]) < 0.006, "{errors}");
+            assert!(ink.is_none() || number(&errors["rest"]) > 3.0 * number(&errors["inks"]), "{errors}");
+        }
+        let passes = report["passes"].as_array().unwrap();
+        assert_eq!(passes.len(), usize::from(ink.is_some()), "{passes:?}");
+        for pass in passes {
+            assert_eq!(pass["ink"], Ink::Yellow.name());
+            let truth = [off[0] as f64 / camera::DOTS_PER_MM, -off[1] as f64 / camera::DOTS_PER_MM];
+            for c in 0..2 {
+                assert!((number(&pass["off_mm"][c]) - truth[c]).abs() < 0.01, "{pass} {truth:?}");
+            }
+        }
     }
 }
 
