@@ -373,6 +373,11 @@ mod tests {
     #[test]
     fn what_is_not_possible_is_said_and_changes_nothing() {
         let mut ticket = Ticket::default();
+        // An override of pages that changes nothing is possible, and one that changes anything is not.
+        let pages = || ("pages", IppValue::RangeOfInteger { min: 1, max: 2 });
+        assert!(ticket.take("overrides", &collection([pages()])));
+        assert!(!ticket.take("overrides", &collection([pages(), ("media-type", keyword("film"))])));
+        assert!(!ticket.take("overrides", &keyword("pages")));
         for (name, value) in [
             ("copies", IppValue::Integer(0)),
             ("copies", IppValue::Integer(100)),

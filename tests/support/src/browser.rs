@@ -1,7 +1,6 @@
 //! Scripts that drive a page in a real browser. `cargo xtask preview` brings browser and Node, and names them.
 
-use std::ffi::OsStr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::needs::{self, Need};
@@ -24,9 +23,9 @@ impl Browser {
     ///
     /// # Panics
     /// When it fails.
-    pub fn run(&self, args: &[&str], page: impl AsRef<OsStr>) {
+    pub fn run(&self, args: &[&str], page: &Path) {
         let mut command = Command::new(&self.node);
-        command.args(args).current_dir(&self.scripts).env("FOILPRESS_PAGE", page.as_ref());
+        command.args(args).current_dir(&self.scripts).env("FOILPRESS_PAGE", page);
         let status = command.status().expect("node runs");
         assert!(status.success(), "{args:?}: {status}");
     }
@@ -35,7 +34,7 @@ impl Browser {
     ///
     /// # Panics
     /// When one fails.
-    pub fn test(&self, script: &str, pattern: &str, page: impl AsRef<OsStr>) {
+    pub fn test(&self, script: &str, pattern: &str, page: &Path) {
         let pattern = format!("--test-name-pattern={pattern}");
         self.run(&["--test", "--test-reporter=spec", "--test-concurrency=1", &pattern, script], page);
     }
