@@ -102,7 +102,12 @@ pub fn seeds() -> Vec<(String, Vec<u8>)> {
         "layers-ora",
         &archive("image/openraster", &[("stack.xml", list.as_bytes()), ("data/a.png", &picture)]),
     );
-    add(1, "merged-kra", &archive("application/x-krita", &[("mergedimage.png", &picture)]));
+    let about = "<DOC><IMAGE width='16' height='8' x-res='600' y-res='600' name='art'/></DOC>";
+    add(
+        1,
+        "merged-kra",
+        &archive("application/x-krita", &[("maindoc.xml", about.as_bytes()), ("mergedimage.png", &picture)]),
+    );
     for (name, photometric, samples, bits, extra, compression) in [
         ("grey-tif", 1, 1, 8, None, 1),
         ("white-is-zero-bits-tif", 0, 1, 1, None, 1),
@@ -158,7 +163,14 @@ pub fn seeds() -> Vec<(String, Vec<u8>)> {
 fn archive(kind: &str, entries: &[(&str, &[u8])]) -> Vec<u8> {
     let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
     for (name, bytes) in std::iter::once(("mimetype", kind.as_bytes())).chain(entries.iter().copied()) {
-        let written = zip.start_file(name, SimpleFileOptions::default()).map(|()| zip.write_all(bytes));
+        // The kind is stored, by which it is known.
+        let method = if name == "mimetype" {
+            zip::CompressionMethod::Stored
+        } else {
+            zip::CompressionMethod::Deflated
+        };
+        let options = SimpleFileOptions::default().compression_method(method);
+        let written = zip.start_file(name, options).map(|()| zip.write_all(bytes));
         assert!(matches!(written, Ok(Ok(()))), "memory takes every byte");
     }
     zip.finish().expect("memory takes every byte").into_inner()
