@@ -12,3 +12,4 @@
 pub mod cli;
 mod folders;
 mod libraries;
+mod own_inks;

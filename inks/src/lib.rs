@@ -22,6 +22,7 @@ mod lobes;
 pub mod model;
 pub mod names;
 mod open;
+pub mod own;
 pub mod predict;
 mod problem;
 pub mod provenance;

@@ -9,6 +9,8 @@
 
 use protocol::ink::Ink;
 
+use crate::own::{self, Own};
+
 /// Names in addition to [`Ink::name`] and [`Ink::short`], with words joined by `-`.
 const ALSO: [(&str, Ink); 32] = [
     ("k", Ink::Black),
@@ -91,8 +93,13 @@ fn japanese(name: &str) -> Option<Ink> {
     JAPANESE.iter().find(|(known, _)| *known == whole).map(|&(_, ink)| ink)
 }
 
-/// The ink of this name or code, if the whole text is one.
+/// The ink of this name or code, if the whole text is one; of an ink of one's own that it poses as.
 pub fn ink(text: &str) -> Option<Ink> {
+    cartridge(text).or_else(|| own::named(text).map(Own::poses_as))
+}
+
+/// The ink of this name or code among those that the printer knows.
+pub(crate) fn cartridge(text: &str) -> Option<Ink> {
     let words: Vec<String> = text
         .split(|c: char| !c.is_alphanumeric())
         .filter(|word| !word.is_empty())
@@ -109,6 +116,7 @@ pub fn known() -> impl Iterator<Item = &'static str> {
         .into_iter()
         .map(Ink::name)
         .chain(ALSO.iter().map(|(name, _)| *name))
+        .chain(own::all().iter().map(Own::name))
         .filter(|name| name.len() > 2)
 }
 

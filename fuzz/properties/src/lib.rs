@@ -2,6 +2,7 @@
 //!
 //! The fuzzer calls one of these; the project's ordinary tests call all of them with the corpora.
 
+pub mod art;
 pub mod engine;
 pub mod frame;
 pub mod host;

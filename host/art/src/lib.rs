@@ -71,7 +71,7 @@ pub use compose::{
 };
 pub use intent::Intent;
 pub use open::{is_art, open};
-pub use options::{Options, Pages, Room};
+pub use options::{Options, Pages, Room, TOLERANCES};
 pub use page::Page;
 pub use svg::DRAWING;
 pub use trace::Path as CutPath;

@@ -151,6 +151,38 @@ pub fn typed(word: &str) -> Result<Ink, String> {
     }
 }
 
+/// Reads a colour of the art and the ink it stands for, such as `#ff0000=gold`. The name of an ink of one's own alone is that
+/// ink in its own colour.
+///
+/// # Errors
+/// A message that says how it is written.
+pub fn colour(text: &str) -> Result<(Ink, [u8; 3]), String> {
+    match text.split_once('=') {
+        Some((colour, ink)) => Ok((typed(ink.trim())?, inks::own::colour(colour)?)),
+        None => match inks::own::named(text) {
+            Some(own) => Ok((own.poses_as(), own.colour())),
+            None => Err("write it as a colour and an ink, such as #ff0000=gold".into()),
+        },
+    }
+}
+
+/// What is wrong with the colours that stand for inks, after the name of their option.
+pub fn wrong_colours(colours: &[(Ink, [u8; 3])]) -> Option<String> {
+    /// Far more than cartridges.
+    const MOST: usize = 16;
+    if colours.len() > MOST {
+        return Some(format!("is given {} times; {MOST} is the most", colours.len()));
+    }
+    if let Some((ink, _)) = colours.iter().find(|(_, colour)| *colour == [255; 3]) {
+        return Some(format!("#ffffff={} is bare paper, which no ink prints", ink.name()));
+    }
+    colours.iter().enumerate().find_map(|(at, (ink, colour))| {
+        let (other, _) = colours[..at].iter().find(|(_, earlier)| earlier == colour)?;
+        let [r, g, b] = colour;
+        Some(format!("gives #{r:02x}{g:02x}{b:02x} two inks, {} and {}", other.name(), ink.name()))
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -5,6 +5,9 @@ use protocol::ink::Ink;
 
 use sheet::Size;
 
+/// How far a colour may be from that of an ink, in steps of red, green and blue.
+pub const TOLERANCES: std::ops::RangeInclusive<u8> = 0..=60;
+
 /// How to read art.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {

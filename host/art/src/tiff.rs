@@ -18,6 +18,7 @@ use ::tiff::tags::Tag;
 use super::artwork::Artwork;
 use super::cmyk::{self, PLATES};
 use super::coverage::{Coverage, Scan};
+use super::cut_lines;
 use super::error::{NamedPart, io, wrong};
 use super::names::{self, stem};
 use super::options::Options;
@@ -227,7 +228,12 @@ fn channels(
                 return Err(wrong(path, format!("channel {} of {samples} has no name", at + 1)));
             }
         };
-        let ink = names::of_part(path, name, NamedPart::Channel, notes)?;
+        let ink = if cut_lines::is_cut(name) {
+            notes.push(cut_lines::note(&path.display(), "channel", name));
+            None
+        } else {
+            names::of_part(path, name, NamedPart::Channel, notes)?
+        };
         if ink.is_some() && inverted {
             notes.push(format!(
                 "{}: black is ink in channel `{name}`, as Photoshop displays it",

@@ -495,6 +495,22 @@ mod tests {
     }
 
     #[test]
+    fn colours_that_the_user_names_are_inks_of_their_own() {
+        let passes = |options: &str| {
+            let choices = Choices::read(&super::super::options::parse(options), None).unwrap();
+            let (job, _) = filtered(raster(600, &[[1000, 500, 1400, 800]]), &choices);
+            let passes = inspect(&job, &Silent).inspection.passes;
+            passes.iter().map(|pass| (pass.ink, pass.dots)).collect::<Vec<_>>()
+        };
+        assert_eq!(passes("FoilpressColour=#000000=gold"), [("metallic-gold", 400 * 300)]);
+        assert_eq!(passes("FoilpressColour=Custom.ff0000=white,000000=gold"), [("metallic-gold", 400 * 300)]);
+        // 20 steps beside the black of the page.
+        assert_eq!(passes("FoilpressColour=#141414=gold"), [("black", 400 * 300)]);
+        let near = "FoilpressColour=#141414=gold FoilpressTolerance=20";
+        assert_eq!(passes(near), [("metallic-gold", 400 * 300)]);
+    }
+
+    #[test]
     fn a_page_that_comes_as_a_picture_is_mirrored_about_its_middle_and_moved_where_it_is_wanted() {
         let place = |options: &str| {
             let choices = Choices::read(&super::super::options::parse(options), None).unwrap();

@@ -75,6 +75,10 @@ pub struct Choices {
     pub colours: InkSet,
     /// Which colours are inks of their own.
     pub spots: Spots,
+    /// Colours of the page that stand for inks besides: sRGB as drawn.
+    pub inks_of: Vec<(Ink, [u8; 3])>,
+    /// Largest difference of red, green and blue from a colour that stands for an ink, if not the usual one.
+    pub tolerance: Option<u8>,
     /// Whether foils may be printed.
     pub foils: bool,
     /// Where white is printed.
@@ -158,6 +162,10 @@ const GAMMA: [(&str, &str, f64); 3] =
 
 const CURL: [(&str, &str, bool); 2] = [("On", "On (paper)", true), ("Off", "Off (decal film)", false)];
 
+const COLOUR: (&str, &str) = ("None", "None");
+
+const TOLERANCE: (&str, &str) = ("Usual", "As usual (8 for white and black, 12 for others)");
+
 /// `glossy-paper` as a keyword of a printer description: `GlossyPaper`.
 fn camel(name: &str) -> String {
     name.split('-').map(|word| word[..1].to_ascii_uppercase() + &word[1..]).collect()
@@ -188,6 +196,19 @@ pub fn all() -> Vec<DialogOption> {
         text: "Gamma, 0.2 to 5, such as 1.2",
         is: "a number from 0.2 to 5, such as 1.2",
     });
+    let mut colour = option("FoilpressColour", "A colour as an ink", texts([COLOUR].into_iter()));
+    colour.custom = Some(Custom {
+        name: "Colour",
+        text: "Colour and ink, such as #ff0000=gold",
+        is: "colours and their inks, such as #ff0000=gold",
+    });
+    let mut tolerance =
+        option("FoilpressTolerance", "Difference from such a colour", texts([TOLERANCE].into_iter()));
+    tolerance.custom = Some(Custom {
+        name: "Steps",
+        text: "Steps of red, green and blue, 0 to 60",
+        is: "a number of steps from 0 to 60, such as 12",
+    });
     vec![
         option("MediaType", "Media", Media::all().map(|m| (camel(m.name()), spaced(m.name()))).collect()),
         option("FoilpressInks", "Inks for colours", texts(INKS.into_iter())),
@@ -201,6 +222,8 @@ pub fn all() -> Vec<DialogOption> {
         gamma,
         option("FoilpressHalftone", "Halftone", texts(HALFTONE.iter().map(|row| (row.0, row.1)))),
         place,
+        colour,
+        tolerance,
     ]
 }
 
@@ -226,8 +249,8 @@ impl Choices {
         let asked = |keyword: &str| {
             options.iter().rev().find(|(name, _)| name.eq_ignore_ascii_case(keyword)).map(|(_, value)| value)
         };
-        let mut numbers = [0; 12];
-        let (mut corner, mut exponent) = (None, None);
+        let mut numbers = [0; 14];
+        let (mut corner, mut exponent, mut inks_of, mut tolerance) = (None, None, Vec::new(), None);
         for (number, option) in numbers.iter_mut().zip(all()) {
             let find = |value: &str| option.choices.iter().position(|c| c.0.eq_ignore_ascii_case(value));
             let usual =
@@ -240,10 +263,14 @@ impl Choices {
                 Some(choice) => *number = choice,
                 None if option.keyword == "FoilpressPosition" => corner = Some(read_corner(&option, value)?),
                 None if option.keyword == "FoilpressGamma" => exponent = Some(read_gamma(&option, value)?),
+                None if option.keyword == "FoilpressColour" => inks_of = read_colours(&option, value)?,
+                None if option.keyword == "FoilpressTolerance" => {
+                    tolerance = Some(read_steps(&option, value)?)
+                }
                 None => return Err(option.no_choice(value)),
             }
         }
-        let [media, inks, spots, foils, white, finish, quality, curl, intent, gamma, halftone, place] =
+        let [media, inks, spots, foils, white, finish, quality, curl, intent, gamma, halftone, place, ..] =
             numbers;
         let process = InkSet::of([Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black]);
         let is_custom = |keyword: &str| {
@@ -258,6 +285,8 @@ impl Choices {
                 _ => InkSet::of([Ink::Cyan, Ink::Magenta, Ink::Yellow]),
             },
             spots: SPOTS[spots].2,
+            inks_of,
+            tolerance,
             foils: FOILS[foils].2,
             white: WHITE[white].2,
             finish: FINISH[finish].2,
@@ -302,6 +331,20 @@ fn read_corner(option: &DialogOption, value: &str) -> Result<Point, NoChoice> {
 
 fn read_gamma(option: &DialogOption, value: &str) -> Result<f64, NoChoice> {
     bare(value).parse().ok().filter(|gamma| GAMMAS.contains(gamma)).ok_or_else(|| option.no_choice(value))
+}
+
+/// Colours and their inks, by the rules of `foilpress layers --colour`.
+fn read_colours(option: &DialogOption, value: &str) -> Result<Vec<(Ink, [u8; 3])>, NoChoice> {
+    let read = bare(value).split(',').map(art::names::colour).collect::<Result<Vec<_>, _>>();
+    read.ok().filter(|read| art::names::wrong_colours(read).is_none()).ok_or_else(|| option.no_choice(value))
+}
+
+fn read_steps(option: &DialogOption, value: &str) -> Result<u8, NoChoice> {
+    bare(value)
+        .parse()
+        .ok()
+        .filter(|steps| art::TOLERANCES.contains(steps))
+        .ok_or_else(|| option.no_choice(value))
 }
 
 /// `*DefaultKEYWORD: value` in a printer description.
@@ -441,6 +484,20 @@ mod tests {
             error.contains("FoilpressWhite") && error.contains("Beneath") && error.contains("Silhouette"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn colours_and_steps_that_cannot_be_are_answered_with_what_can() {
+        for wrong in ["red=gold", "#ff0000", "#ff0000=jam", "#ffffff=gold", "#ff0000=gold,#ff0000=white"] {
+            let error = Choices::read(&[pair("FoilpressColour", wrong)], None).unwrap_err().to_string();
+            assert!(
+                error.ends_with("choose None or colours and their inks, such as #ff0000=gold"),
+                "{error}"
+            );
+        }
+        for wrong in ["61", "-1", "many"] {
+            assert!(Choices::read(&[pair("FoilpressTolerance", wrong)], None).is_err(), "{wrong}");
+        }
     }
 
     #[test]

@@ -60,6 +60,10 @@ pub fn main() -> ExitCode {
             usual(panic);
         }
     }));
+    // Before arguments are read: they name inks.
+    for problem in crate::own_inks::load() {
+        say(&format!("foilpress: note: {}; none of them is known", console::chain(&problem)));
+    }
     let typed: Vec<OsString> = std::env::args_os().collect();
     let mut program = program(typed.iter().any(|word| word == "-h"));
     let args = match preset::expand(typed, &program) {

@@ -246,3 +246,65 @@ fn shown_figures_give_the_listed_reflectance() {
         "{shown}"
     );
 }
+
+#[test]
+fn an_ink_of_another_maker_has_a_name_of_its_own_and_the_barcode_it_poses_as() {
+    let bench = Bench::new();
+    let drawing = |file: &str, inside: &str| {
+        let svg = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"20mm\" height=\"10mm\" viewBox=\"0 0 20 10\">{inside}</svg>"
+        );
+        fs::write(bench.path(file), svg).expect("a drawing");
+    };
+    drawing("layer.svg", "<g id=\"neon-pink\"><rect width=\"10\" height=\"10\"/></g>");
+    drawing("colour.svg", "<rect width=\"10\" height=\"10\" fill=\"#ff40a0\"/>");
+    let plan = |args: &str| -> Value {
+        serde_json::from_str(&bench.done(&format!("plan layers {args} --json"))).expect("a plan")
+    };
+    // 10 x 10 mm at 600 dpi.
+    let square = 236 * 236;
+    let printed = |args: &str| {
+        let plan = plan(args);
+        let (pass, cartridge) = (&plan["passes"][0], &plan["cartridges"][0]);
+        assert_eq!(
+            (plan["passes"].as_array().map(Vec::len), &pass["ink"]),
+            (Some(1), &"metallic-magenta".into()),
+            "{plan}"
+        );
+        assert!(pass["dots"].as_u64().is_some_and(|dots| dots.abs_diff(square) < 1000), "{plan}");
+        assert_eq!(cartridge["barcode"], 9);
+        cartridge["sold_as"].as_str().expect("a name").to_owned()
+    };
+    let before = plan("colour.svg");
+    assert!(before["cartridges"].as_array().is_some_and(|all| all.len() > 1), "{before}");
+    let said = bench.done("inks add Neon-Pink --as metallic-red --colour ff40a0");
+    let line = "neon-pink        #ff40a0  poses as metallic-magenta (barcode 9, ink code 05)";
+    assert!(said.starts_with(line), "{said}");
+    assert_eq!(
+        entries(named(&said).parent().expect("a folder")),
+        ["inks.toml"],
+        "nothing half-written stays"
+    );
+    for list in ["inks list --inks process", "inks list --added"] {
+        assert!(bench.done(list).contains(line), "{list}");
+    }
+    for args in ["layer.svg", "colour.svg --colour neon-pink", "colour.svg --colour #ff40a0=neon-pink"] {
+        assert!(printed(args).ends_with(" or your neon-pink"), "{args}");
+    }
+    for (args, expected) in [
+        ("inks add neon-pink --as gold --colour 000000", "there is an ink `neon-pink` already"),
+        ("inks add gold --as gold --colour 000000", "already"),
+        ("inks add a-pink --as gold --colour pink", "no colour"),
+    ] {
+        let said = bench.refused(1, args);
+        assert!(said.contains(expected), "{args}: {said}");
+    }
+    assert!(bench.refused(2, "inks add a-pink --as jam --colour 000000").contains("`jam` is not an ink"));
+    bench.done("inks remove neon-pink");
+    assert!(bench.refused(2, "plan layers colour.svg --colour neon-pink").contains("write it as a colour"));
+    // A list that cannot be read stops nothing that does not need it, and is told.
+    fs::write(named(&said), "[[ink]]\nname = \"\u{1b}[2J\"\n").expect("a list");
+    let output = bench.command("papers").output().expect("the program");
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success() && told.contains("inks.toml") && !told.contains('\u{1b}'), "{told}");
+}

@@ -116,3 +116,143 @@ fn a_cancelled_filter_leaves_neither_folders_nor_a_ghostscript() {
     assert!(!runs(&format!("-f\0{file}")), "Ghostscript goes on");
     assert!(entries(&bench.path("scratch")).is_empty(), "{:?}", entries(&bench.path("scratch")));
 }
+
+/// Runs the program, and how long it took and how many megabytes it had in memory at its most.
+#[cfg(target_os = "linux")]
+fn measured(bench: &Bench, command: &str) -> (Option<i32>, String, Duration, u64) {
+    let begun = Instant::now();
+    let mut program = bench.command(command);
+    let mut child = program.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let (about, mut peak) = (format!("/proc/{}/status", child.id()), 0);
+    let code = loop {
+        // The system keeps the highest value itself; only what is taken in the last moment may be missed.
+        let said = fs::read_to_string(&about).unwrap_or_default();
+        let high = said
+            .lines()
+            .find_map(|line| line.strip_prefix("VmHWM:")?.trim().strip_suffix(" kB")?.parse().ok());
+        peak = peak.max(high.unwrap_or(0));
+        match child.try_wait().unwrap() {
+            Some(status) => break status.code(),
+            None => std::thread::sleep(Duration::from_millis(1)),
+        }
+    };
+    let took = begun.elapsed();
+    let said = text(&child.wait_with_output().unwrap().stderr);
+    (code, said, took, peak / 1024)
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn hostile_art_of_each_kind_ends_within_five_seconds_and_500_megabytes() {
+    use std::io::Write as _;
+    use zip::write::SimpleFileOptions;
+    let bench = Bench::new();
+    let chain = |count: usize, each: &dyn Fn(usize) -> String| (0..count).map(each).collect::<String>();
+    let drawing = |name: &str, inside: &str| {
+        let svg = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"30mm\" height=\"30mm\">{inside}</svg>"
+        );
+        fs::write(bench.path(name), svg).unwrap();
+    };
+    let fill = |paint: &str| format!("<rect width='30' height='30' {paint}/>");
+    let clip = |i: usize| format!("<clipPath id='c{i}' clip-path='url(#c{})'>{}</clipPath>", i + 1, fill(""));
+    drawing("clips.svg", &(chain(3000, &clip) + &fill("clip-path='url(#c0)'")));
+    let tile = |i: usize| {
+        let next = format!("fill='url(#p{})'", i + 1);
+        format!(
+            "<pattern id='p{i}' width='4' height='4' patternUnits='userSpaceOnUse'>{}</pattern>",
+            fill(&next)
+        )
+    };
+    drawing("patterns.svg", &(chain(400, &tile) + &fill("fill='url(#p0)'")));
+    let huge = "<pattern id='p' width='30000' height='30000' patternUnits='userSpaceOnUse'><circle r='1'/></pattern>";
+    drawing("tile.svg", &(huge.to_owned() + &fill("fill='url(#p)'")));
+    drawing("deep.svg", &("<g>".repeat(200_000) + &"</g>".repeat(200_000)));
+    drawing("device.svg", "<image width='9' height='9' href='/dev/zero'/>");
+    let laughs =
+        chain(9, &|i| format!("<g id='g{i}'>{}</g>", format!("<use href='#g{}'/>", i + 1).repeat(10)));
+    drawing("laughs.svg", &laughs);
+
+    // 600 megabytes behind every part of an archive that is read.
+    let bomb = |name: &str, kind: &str, part: &str| {
+        let mut zip = zip::ZipWriter::new(fs::File::create(bench.path(name)).unwrap());
+        // Stored, by which the kind is known.
+        let stored = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+        zip.start_file("mimetype", stored).unwrap();
+        zip.write_all(kind.as_bytes()).unwrap();
+        let about = "<DOC><IMAGE width='60' height='40' x-res='600' y-res='600'/></DOC>";
+        zip.start_file("maindoc.xml", SimpleFileOptions::default()).unwrap();
+        zip.write_all(about.as_bytes()).unwrap();
+        if kind.ends_with("openraster") && part != "stack.xml" {
+            let list = "<image w='60' h='40'><stack><layer name='white' src='data/a.png'/></stack></image>";
+            zip.start_file("stack.xml", SimpleFileOptions::default()).unwrap();
+            zip.write_all(list.as_bytes()).unwrap();
+        }
+        zip.start_file(part, SimpleFileOptions::default().compression_level(Some(1))).unwrap();
+        let zeros = vec![b' '; 1 << 22];
+        (0..150).for_each(|_| zip.write_all(&zeros).unwrap());
+        zip.finish().unwrap();
+    };
+    bomb("picture.ora", "image/openraster", "data/a.png");
+    bomb("list.ora", "image/openraster", "stack.xml");
+    bomb("merged.kra", "application/x-krita", "mergedimage.png");
+
+    // 3 600 megapixels in a header, and strips of four gigabytes in a file of a few bytes.
+    let tiff = |name: &str, side: u32, strip: u32| {
+        let mut file = b"II*\0\x08\0\0\0".to_vec();
+        let fields: [(u16, u16, u32, u32); 9] = [
+            (256, 4, 1, side),
+            (257, 4, 1, side),
+            (258, 3, 1, 8),
+            (259, 3, 1, 8),
+            (262, 3, 1, 1),
+            (273, 4, 1, 8),
+            (277, 3, 1, 1),
+            (278, 4, 1, side),
+            (279, 4, 1, strip),
+        ];
+        file.extend((fields.len() as u16).to_le_bytes());
+        for (tag, kind, count, value) in fields {
+            file.extend(tag.to_le_bytes().into_iter().chain(kind.to_le_bytes()));
+            file.extend(count.to_le_bytes().into_iter().chain(value.to_le_bytes()));
+        }
+        file.extend([0; 4]);
+        fs::write(bench.path(name), file).unwrap();
+    };
+    tiff("size.tif", 60_000, 100);
+    tiff("strip.tif", 100, u32::MAX);
+
+    // A profile of 600 megabytes in a picture of four pixels.
+    let mut profile = flate2::write::ZlibEncoder::new(b"x\0\0".to_vec(), flate2::Compression::fast());
+    let zeros = vec![0; 1 << 22];
+    (0..150).for_each(|_| profile.write_all(&zeros).unwrap());
+    let profile = profile.finish().unwrap();
+    let mut encoder = png::Encoder::new(fs::File::create(bench.path("profile.png")).unwrap(), 2, 2);
+    encoder.set_color(png::ColorType::Grayscale);
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_chunk(png::chunk::iCCP, &profile).unwrap();
+    writer.write_image_data(&[0; 4]).unwrap();
+    writer.finish().unwrap();
+
+    for name in [
+        "clips.svg",
+        "patterns.svg",
+        "tile.svg",
+        "deep.svg",
+        "device.svg",
+        "laughs.svg",
+        "picture.ora",
+        "list.ora",
+        "merged.kra",
+        "size.tif",
+        "strip.tif",
+        "profile.png",
+    ] {
+        let (code, said, took, megabytes) = measured(&bench, &format!("plan layers {name}"));
+        assert!(!said.contains("found an archive"), "{name} is not read as what it is");
+        println!("{name}: {took:.1?}, {megabytes} MB, {code:?}: {said}");
+        assert!(code == Some(1) && said.contains(name), "{name}: {code:?} {said}");
+        assert!(took < Duration::from_secs(5), "{name} took {took:?}");
+        assert!((1..500).contains(&megabytes), "{name} took {megabytes} MB");
+    }
+}

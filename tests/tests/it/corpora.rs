@@ -60,6 +60,11 @@ fn a_boot_loaders_replies_hold() {
 }
 
 #[test]
+fn art_holds() {
+    replay("art", properties::art::check);
+}
+
+#[test]
 fn a_negotiations_answers_hold() {
     replay("talk", properties::talk::check);
 }

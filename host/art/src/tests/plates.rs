@@ -98,7 +98,11 @@ fn photoshops_spot_channels_are_layers_beside_the_process_plates() {
         layers,
         [(Ink::Magenta, (0, 0, 3, 3, 16)), (Ink::Black, (4, 4, 9, 9, 36)), (Ink::White, (2, 2, 5, 5, 16))]
     );
-    assert!(art.notes.iter().any(|note| note.contains("channel `Dieline` names no ink")), "{:?}", art.notes);
+    assert!(
+        art.notes.iter().any(|note| note.contains("channel `Dieline` is for a cutter")),
+        "{:?}",
+        art.notes
+    );
     let file = tiff_file((20, 10), &channels, 5, &[extra]);
     let text = refused(&[bench.write("noname.tif", file)]);
     assert!(text.contains("channel 5 of 6 has no name"), "{text}");

@@ -3,6 +3,7 @@
 //! Cost: one look at each byte, one bit of memory for each dot and pass, because the ribbon a pass takes depends on where its dots are.
 
 use protocol::ink::Ink;
+use protocol::paper::Paper;
 
 use observe::Observer;
 use press::inspect::{StreamError, inspect};
@@ -40,6 +41,8 @@ pub struct Checked {
     pub ribbon_mm: Vec<f64>,
     /// Whose dialect it is, if it is not ours: worth a word, for only ours is known to print.
     pub dialect: Option<&'static str>,
+    /// Whether its paper is fed by hand, with the feed lever at M.
+    pub by_hand: bool,
 }
 
 /// Checks that these bytes are one whole legal job, and nothing else.
@@ -66,5 +69,7 @@ pub fn check(job: &[u8], observer: &dyn Observer) -> Result<Checked, Unsendable>
     }
     let dpi = inspected.inspection.setup.resolution.unwrap_or((600, 600));
     let ribbon_mm = inspected.passes.iter().map(|pass| ribbon::of(&pass.plane, dpi).ribbon_mm).collect();
-    Ok(Checked { passes, inks, ribbon_mm, dialect: inspected.inspection.dialect })
+    // Of all papers, the vendor feeds postcards by hand.
+    let by_hand = inspected.inspection.setup.paper == Some(Paper::Postcard.name());
+    Ok(Checked { passes, inks, ribbon_mm, dialect: inspected.inspection.dialect, by_hand })
 }

@@ -48,6 +48,10 @@ pub(crate) fn find(status: &Status, wanted: &[Ink]) -> Found {
 impl std::fmt::Display for Missing {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} ({}, barcode {})", self.ink.name(), self.ink.part(), self.ink.barcode())?;
+        let own: Vec<&str> = inks::own::posing_as(self.ink).collect();
+        if !own.is_empty() {
+            write!(f, " or your {}, which poses as it", own.join(" or "))?;
+        }
         match self.condition {
             Some("backwards") => write!(f, ": it is loaded the wrong way round"),
             Some(condition) => write!(f, ": {condition}"),

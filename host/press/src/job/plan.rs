@@ -4,7 +4,7 @@
 
 use std::fmt::{self, Write as _};
 
-use inks::{Certainty, Library, Severity};
+use inks::{Certainty, Library, Severity, own};
 use observe::visible_line;
 use protocol::ink::{Ink, Kind};
 use protocol::paper::{LEFT, Paper};
@@ -91,7 +91,7 @@ pub struct Suggestion {
 pub struct Cartridge {
     /// Name of the ink.
     pub ink: &'static str,
-    /// What owners call it.
+    /// What owners call it, and inks of their own that the printer takes for it.
     pub sold_as: String,
     /// The vendor's part number.
     pub part: &'static str,
@@ -297,7 +297,10 @@ fn cartridges(planned: &[Planned], passes: &[Pass], library: &Library) -> Vec<Ca
         let its = passes.iter().filter(|pass| pass.ink == ink.name());
         Cartridge {
             ink: ink.name(),
-            sold_as: library.cartridge(ink).map_or_else(|| ink.name().into(), |c| c.okidata.clone()),
+            sold_as: own::posing_as(ink).fold(
+                library.cartridge(ink).map_or_else(|| ink.name().into(), |c| c.okidata.clone()),
+                |names, own| names + " or your " + own,
+            ),
             part: ink.part(),
             barcode: ink.barcode(),
             first_pass: its.clone().next().map_or(1, |pass| pass.number),

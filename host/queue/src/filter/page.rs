@@ -64,6 +64,8 @@ impl Press<'_> {
             dpi: Some(dpi.into()),
             reserved: !reserved.is_empty(),
             inks: reserved,
+            colours: choices.inks_of.clone(),
+            tolerance: choices.tolerance,
             ..art::Options::default()
         }
     }

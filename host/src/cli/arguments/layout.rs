@@ -22,7 +22,7 @@ pub struct LayoutArgs {
     /// Paper size: a4, letter, legal, executive, b5, postcard, or the size of the sheet such as 120x180mm
     #[arg(long, default_value = "a4", value_parser = layout::paper::read)]
     pub paper: Paper,
-    /// Position of the top left corner, across and down, such as 20x30mm [default: centred]
+    /// Position of the top left corner, across and down, such as 20x30mm; sheets lie up to 1 mm off sideways [default: centred]
     #[arg(long, value_name = "X,Y", allow_hyphen_values = true)]
     pub at: Option<Point>,
     /// Edge that --at is measured from

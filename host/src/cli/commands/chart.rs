@@ -11,6 +11,10 @@ use crate::cli::arguments::{HalftoneArg, InkArgs};
 use crate::cli::printing::deliver::DeliverArgs;
 use crate::cli::printing::{Artwork, JobArgs, ResultArgs};
 use art::names::typed;
+use device::connection::Destination;
+use device::deliver::{Cartridges, find_cartridges};
+use device::printers::Printers;
+use device::questions::status::Status;
 use observe::Observer;
 use press::chart;
 use press::layout::{Layout, paper};
@@ -69,8 +73,9 @@ struct First {
 
 #[derive(ClapArgs, Debug)]
 struct Heads {
-    /// Inks of the loaded cartridges, separated by commas
-    #[arg(long, value_name = "INKS", value_delimiter = ',', default_value = "black,cyan,magenta,yellow", value_parser = typed)]
+    /// Inks of the strips, separated by commas [default: the cartridges that the printer at --to says are loaded; without a
+    /// bridge there black,cyan,magenta,yellow]
+    #[arg(long, value_name = "INKS", value_delimiter = ',', value_parser = typed)]
     inks: Vec<Ink>,
     #[command(flatten)]
     whole: WholePage,
@@ -221,10 +226,28 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
             whole.print("first", &dots, (&[*ink], &on_first()), false, observer)
         }
         Chart::Heads(Heads { inks, whole }) => {
+            let inks = if inks.is_empty() { &whole.loaded(observer)? } else { inks };
             let dots = chart::heads(once_each(inks)?, whole.paper)?;
             whole.print("heads", &dots, (inks, ON_HEADS), false, observer)
         }
     }
+}
+
+/// Inks of the strips if nobody says more.
+const PROCESS: [Ink; 4] = [Ink::Black, Ink::Cyan, Ink::Magenta, Ink::Yellow];
+
+/// The inks of the cartridges that can print, each once; none if the answer is that of before an error.
+fn loaded(status: &Status) -> Vec<Ink> {
+    let mut inks = Vec::new();
+    for cartridge in
+        status.cartridges.iter().filter(|cartridge| cartridge.condition == "loaded" && !status.stale)
+    {
+        match Ink::from_barcode(cartridge.barcode) {
+            Some(ink) if !inks.contains(&ink) => inks.push(ink),
+            _ => {}
+        }
+    }
+    inks
 }
 
 /// Inks none of which is given twice.
@@ -297,6 +320,23 @@ impl StepArgs {
 }
 
 impl WholePage {
+    /// The inks that the printer at the destination says are loaded; the process inks if there is no printer to ask.
+    fn loaded(&self, observer: &dyn Observer) -> Result<Vec<Ink>> {
+        let Some(Destination::Bridge(address)) = &self.deliver.to else { return Ok(PROCESS.to_vec()) };
+        let why = match find_cartridges(address, &[], &Printers::of_system()?) {
+            Cartridges::Unknown(why) => why,
+            Cartridges::Known { status, .. } => match loaded(&status) {
+                inks if inks.is_empty() => "it reports none that it could print with".into(),
+                inks => return Ok(inks),
+            },
+        };
+        let usual = PROCESS.map(Ink::name).join(", ");
+        observer.note(&format!(
+            "which cartridges are in the printer is not known ({why}): the strips are in {usual}; --inks names others"
+        ));
+        Ok(PROCESS.to_vec())
+    }
+
     fn print(
         &self,
         name: &str,
@@ -310,5 +350,24 @@ impl WholePage {
         let artwork = Artwork { advice: advice.into(), ..artwork(name, dots, allowed, &library) };
         let layout = Layout { camera_marks, ..Layout::centred(self.paper) };
         artwork.print(&layout, &self.media, &self.result, &self.deliver, observer)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use press::simulate::{Carousel, Cartridge, Condition, Lever, Printer, Trouble};
+
+    #[test]
+    fn strips_are_of_the_cartridges_that_the_printer_says_can_print() {
+        let spent = Cartridge { condition: Condition::Backwards, ..Ink::Finish.into() };
+        let cartridges = [Ink::White.into(), spent, Ink::Cyan.into(), Ink::White.into()];
+        let mut printer = Printer::new(Carousel::new(&cartridges).unwrap(), Lever::Auto);
+        let answer = |printer: &Printer| loaded(&Status::read(&printer.status()).unwrap());
+        let mut found = answer(&printer);
+        found.sort();
+        assert_eq!(found, [Ink::Cyan, Ink::White]);
+        printer.strike(Trouble::CoverOpen);
+        assert_eq!(answer(&printer), [], "what was true before an error decides nothing");
     }
 }

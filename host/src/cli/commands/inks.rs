@@ -15,7 +15,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use inks::{Entry, InkSet, Library, Origins, Provenance, Severity, Source, Stack};
+use inks::{Entry, InkSet, Library, Origins, Provenance, Severity, Source, Stack, own};
 use protocol::ink::Ink;
 use serde::Serialize;
 
@@ -42,9 +42,9 @@ pub struct Args {
 
 #[derive(clap::Subcommand, Debug)]
 enum What {
-    /// List the stacks with their layers, their peak reflectance and the origin of their curves; or the libraries that were added
+    /// List the stacks with their layers, their peak reflectance and the origin of their curves; or what was added
     List {
-        /// List the libraries that were added with `inks add` instead
+        /// List the libraries and inks that were added with `inks add` instead
         #[arg(long, conflicts_with_all = ["library", "inks"])]
         added: bool,
         /// Ink library: its folder, or the name it was added under [default: the built-in library, which is modelled, not
@@ -106,23 +106,34 @@ enum What {
     Gamut(gamut::Args),
     /// List the stacks that mixtures of the other stacks can replace
     Redundant(gamut::Redundant),
-    /// Add a library to your own, so that --library finds it by its name
+    /// Add a library to your own, so that --library finds it by its name; or an ink of another maker
+    ///
+    /// A ribbon of another maker is in a cartridge that the printer takes for one it knows. With --as and --colour the ink gets a
+    /// name of its own: art, options and queues may use it, and plans and the check of the cartridges show it beside the
+    /// ink it poses as.
     #[command(after_help = "Examples:\n  \
         foilpress inks add my-library/\n  \
-        foilpress inks add my-library/ --name matt-paper")]
+        foilpress inks add my-library/ --name matt-paper\n  \
+        foilpress inks add neon-pink --as metallic-red --colour ff40a0")]
     Add {
-        /// Folder with `library.toml`, such as `foilpress measure` writes
-        dir: PathBuf,
+        /// Folder with `library.toml`, such as `foilpress measure` writes; or the name of the ink
+        what: PathBuf,
         /// Name of the library [default: the name of the folder]
-        #[arg(long)]
+        #[arg(long, conflicts_with = "poses_as")]
         name: Option<String>,
+        /// Ink whose code and barcode the cartridge has
+        #[arg(long = "as", value_name = "INK", value_parser = art::names::typed, requires = "colour")]
+        poses_as: Option<Ink>,
+        /// Colour of the ink on white paper: red, green and blue, such as ff40a0
+        #[arg(long, value_name = "RRGGBB", requires = "poses_as")]
+        colour: Option<String>,
     },
-    /// Remove a library that was added; the folder or archive it was added from stays as it is
+    /// Remove a library or an ink that was added; the folder or archive it was added from stays as it is
     #[command(after_help = "Examples:\n  \
         foilpress inks list --added\n  \
         foilpress inks remove matt-paper")]
     Remove {
-        /// Name of the library
+        /// Name of the library or the ink
         name: String,
     },
     /// Write a library as one archive, with its licence and the origin of its curves
@@ -182,7 +193,10 @@ pub fn run(args: Args, observer: &dyn Observer) -> anyhow::Result<()> {
         What::Choose(args) => (choose::run(&args, observer)?, Ok(())),
         What::Gamut(args) => (gamut::run(&args, observer)?, Ok(())),
         What::Redundant(args) => (gamut::redundant(&args)?, Ok(())),
-        What::Add { dir, name } => (share::add(&dir, name)?, Ok(())),
+        What::Add { what, poses_as: Some(ink), colour: Some(colour), .. } => {
+            (share::add_ink(&what.to_string_lossy(), &colour, ink)?, Ok(()))
+        }
+        What::Add { what, name, .. } => (share::add(&what, name)?, Ok(())),
         What::Remove { name } => (share::remove(&name)?, Ok(())),
         What::Export { library, output, licence } => {
             (share::export(&library, output.as_deref(), licence.as_deref())?, Ok(()))
@@ -288,6 +302,10 @@ fn list(library: &Library, inks: Option<InkSet>, json: bool) -> anyhow::Result<S
     }
     let origins = Origins::count(entries.iter().copied());
     writeln!(text, "\n{origins}. f is the luminance of the reflectance, in 1/sr.")?;
+    if !own::all().is_empty() {
+        writeln!(text, "\nInks of your own:")?;
+        own::all().iter().for_each(|own| text.push_str(&share::ink_line(own)));
+    }
     Ok(text)
 }
 
@@ -386,6 +404,7 @@ fn layer_lines(library: &Library, ink: Ink, place: &str) -> Vec<String> {
         let gain = dots.dot_gain_um.map_or(String::new(), |gain| format!(", dot gain {gain:.1} um"));
         lines.push(format!("  dots measured by {}, {}: {}{gain}", dots.by, dots.when, dots.setup));
     }
+    lines.extend(own::posing_as(ink).map(|own| format!("  your {own} poses as it")));
     lines.extend(
         cartridge.cautions.iter().map(|caution| format!("  {} ({})", caution.text, caution.certainty)),
     );

@@ -20,7 +20,9 @@ use crate::cli::printing::cut_lines;
 use crate::cli::printing::deliver::DeliverArgs;
 use crate::cli::printing::plan_output::PlanOutputArgs;
 use crate::cli::printing::{Artwork, ResultArgs};
-use art::{Accept, Composed, Finish, GAMMAS, Intent, MOST_CHOKE_MM, Order, Pages, Room, White, names};
+use art::{
+    Accept, Composed, Finish, GAMMAS, Intent, MOST_CHOKE_MM, Order, Pages, Room, TOLERANCES, White, names,
+};
 use observe::Observer;
 use pictures::resolution::RESOLUTIONS;
 use press::job::plan::{Suggestion, grouped};
@@ -41,11 +43,11 @@ pub struct LayersArgs {
     #[arg(long)]
     pub reserved: bool,
     /// Print colours of the art in inks, such as "#ff0000=gold,808080=silver"; may be repeated
-    #[arg(long, value_name = "RRGGBB=INK", value_delimiter = ',', value_parser = colour)]
+    #[arg(long, value_name = "RRGGBB=INK", value_delimiter = ',', value_parser = names::colour)]
     pub colour: Vec<(Ink, [u8; 3])>,
     /// Largest difference of red, green and blue from a colour that stands for an ink, 0 to 60 [default: 8 for the vendor's
     /// white and black, 12 for others]
-    #[arg(long, value_name = "STEPS", value_parser = whole(0..=60u8))]
+    #[arg(long, value_name = "STEPS", value_parser = whole(TOLERANCES))]
     pub tolerance: Option<u8>,
     /// Resolution of the pictures in pixels per inch, if a file states none or a wrong one; of a drawing that states no size on
     /// paper, its units per inch
@@ -156,19 +158,6 @@ fn passes(text: &str) -> Result<(Ink, u8), String> {
     }
 }
 
-/// A colour and the ink it stands for.
-fn colour(text: &str) -> Result<(Ink, [u8; 3]), String> {
-    let (colour, ink) =
-        text.split_once('=').ok_or("write it as a colour and an ink, such as #ff0000=gold")?;
-    let digits = colour.trim().trim_start_matches('#');
-    let number = u32::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 6 && digits.is_ascii());
-    let number = number.ok_or_else(|| {
-        format!("`{colour}` is no colour; write six digits of red, green and blue, such as #ff0000")
-    })?;
-    let [_, red, green, blue] = number.to_be_bytes();
-    Ok((names::typed(ink.trim())?, [red, green, blue]))
-}
-
 fn order(text: &str) -> Result<Order, String> {
     match text {
         "rules" => Ok(Order::Rules),
@@ -207,14 +196,9 @@ impl LayersArgs {
 
     /// The colours that stand for inks.
     fn colours(&self) -> Result<Vec<(Ink, [u8; 3])>> {
-        /// Far more than cartridges.
-        const MOST: usize = 16;
         let inks = self.inks()?;
         if let Some((ink, _)) = self.colour.iter().find(|(ink, _)| !inks.contains(*ink)) {
             return Err(usage(format!("--colour names {}, which is not among --inks", ink.name())));
-        }
-        if self.colour.len() > MOST {
-            return Err(usage(format!("--colour is given {} times; {MOST} is the most", self.colour.len())));
         }
         if self.tolerance.is_some()
             && !self.reserved
@@ -225,19 +209,8 @@ impl LayersArgs {
                 "--tolerance says how near a colour must be to that of an ink; add --reserved or --colour",
             ));
         }
-        let paper = self.colour.iter().find(|(_, colour)| *colour == [255; 3]);
-        if let Some((ink, _)) = paper {
-            return Err(usage(format!("--colour #ffffff={} is bare paper, which no ink prints", ink.name())));
-        }
-        for (at, (ink, colour)) in self.colour.iter().enumerate() {
-            if let Some((other, _)) = self.colour[..at].iter().find(|(_, earlier)| earlier == colour) {
-                let [r, g, b] = colour;
-                return Err(usage(format!(
-                    "--colour gives #{r:02x}{g:02x}{b:02x} two inks, {} and {}",
-                    other.name(),
-                    ink.name()
-                )));
-            }
+        if let Some(wrong) = names::wrong_colours(&self.colour) {
+            return Err(usage(format!("--colour {wrong}")));
         }
         Ok(self.colour.clone())
     }

@@ -23,6 +23,7 @@ use observe::Observer;
 pub struct Terminal<'o> {
     force: bool,
     cartridges_shown: bool,
+    by_hand: bool,
     observer: &'o dyn Observer,
     position: RefCell<Position>,
 }
@@ -45,7 +46,12 @@ impl<'o> Terminal<'o> {
     /// With `force`, a device that does not identify itself as an ALPS printer gets a note instead of a refusal.
     /// `cartridges_shown`: the loaded cartridges were shown before, and are not shown again.
     pub fn new(force: bool, cartridges_shown: bool, observer: &'o dyn Observer) -> Terminal<'o> {
-        Terminal { force, cartridges_shown, observer, position: RefCell::default() }
+        Terminal { force, cartridges_shown, by_hand: false, observer, position: RefCell::default() }
+    }
+
+    /// The same for a job whose paper is fed by hand, or not: the check of the cartridges looks at the lever, too.
+    pub fn fed_by_hand(self, by_hand: bool) -> Terminal<'o> {
+        Terminal { by_hand, ..self }
     }
 
     fn begin(&self, entry: &Entry) {
@@ -121,7 +127,7 @@ impl Caller for Terminal<'_> {
     fn tell(&self, news: &News<'_>) {
         match news {
             News::Printer(cartridges) if !self.cartridges_shown => {
-                self.observer.note(&cartridges_text(cartridges));
+                self.observer.note(&cartridges_text(cartridges, self.by_hand));
             }
             News::Printer(_) => {}
             News::Reset => self.observer.note("the printer has been reset; if a sheet is still in it, take it out"),
@@ -195,8 +201,18 @@ pub fn cartridges_needed(inks: &[Ink]) -> String {
     format!("cartridges needed, in this order: {}", list.join(", "))
 }
 
-/// What the printer reports about the cartridges a job needs.
-pub fn cartridges_text(cartridges: &Cartridges) -> String {
+/// What the printer reports about the cartridges a job needs, and about its lever if the paper is fed by hand.
+pub fn cartridges_text(cartridges: &Cartridges, by_hand: bool) -> String {
+    match cartridges {
+        Cartridges::Known { status, .. } if by_hand && status.tray => format!(
+            "{}\nThe feed lever stands at automatic: set it to M before the sheet goes in, postcards are fed by hand.",
+            found_text(cartridges)
+        ),
+        _ => found_text(cartridges),
+    }
+}
+
+fn found_text(cartridges: &Cartridges) -> String {
     let unknown = |why: &str| format!("The loaded cartridges are not known: {why}");
     match cartridges {
         Cartridges::Unknown(why) => unknown(why),
@@ -211,6 +227,27 @@ pub fn cartridges_text(cartridges: &Cartridges) -> String {
                  loaded.",
                 names.join(", ")
             )
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use device::questions::status::Status;
+    use press::simulate::{Carousel, Lever, Printer};
+
+    #[test]
+    fn the_check_of_the_cartridges_tells_of_a_lever_that_stands_wrong_for_the_paper() {
+        let text = |lever: Lever, by_hand: bool| {
+            let printer = Printer::new(Carousel::new(&[Ink::Black.into()]).unwrap(), lever);
+            let answer = printer.status().to_vec();
+            let status = Status::read(&answer).unwrap();
+            cartridges_text(&Cartridges::Known { answer, status, found: Found::All }, by_hand)
+        };
+        assert!(text(Lever::Auto, true).contains("set it to M"));
+        for (lever, by_hand) in [(Lever::Manual, true), (Lever::Manual, false), (Lever::Auto, false)] {
+            assert!(!text(lever, by_hand).contains("lever"), "{by_hand}");
         }
     }
 }

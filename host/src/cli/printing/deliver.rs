@@ -62,7 +62,7 @@ impl DeliverArgs {
         let checked = forms::check(&job.bytes, observer)?;
         if let Destination::Bridge(address) = to {
             let cartridges = find_cartridges(address, &checked.inks, &Printers::of_system()?);
-            show(&format!("{}\n", cartridges_text(&cartridges)))?;
+            show(&format!("{}\n", cartridges_text(&cartridges, checked.by_hand)))?;
         }
         if !self.yes {
             confirm(name)?;
@@ -169,7 +169,8 @@ fn to_device(job: Job<'_>, path: &Path, order: Order, observer: &dyn Observer) -
 fn to_bridge(job: Job<'_>, address: &Address, order: Order, observer: &dyn Observer) -> Result<()> {
     let copies = order.copies;
     let printers = Printers::of_system()?;
-    let terminal = Terminal::new(order.force, order.cartridges_shown, observer);
+    let terminal =
+        Terminal::new(order.force, order.cartridges_shown, observer).fed_by_hand(job.checked.by_hand);
     let delivery = Delivery::new(&printers, &terminal);
     // Before anything is queued: a mistyped address or a missing permission leaves no job behind.
     let mut met = Some(

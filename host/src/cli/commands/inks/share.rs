@@ -5,10 +5,12 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use inks::own::{self, Own};
 use inks::{Library, archive};
+use protocol::ink::Ink;
 
 use crate::cli::output::{Staged, file_name};
-use crate::libraries;
+use crate::{libraries, own_inks};
 
 /// The name that a folder or a file suggests.
 fn suggested(path: &Path, name: Option<String>) -> String {
@@ -36,6 +38,29 @@ pub fn add(dir: &Path, name: Option<String>) -> Result<String> {
     Library::from_dir(dir).with_context(|| format!("{} is not a usable ink library", dir.display()))?;
     let members = archive::gather(dir).with_context(|| format!("{}", dir.display()))?;
     installed(&suggested(dir, name), &members, dir)
+}
+
+/// An ink of one's own in a line.
+pub fn ink_line(own: &Own) -> String {
+    let ([red, green, blue], ink) = (own.colour(), own.poses_as());
+    format!(
+        "{:<16} #{red:02x}{green:02x}{blue:02x}  poses as {} (barcode {}, ink code {:02x})\n",
+        own.name(),
+        ink.name(),
+        ink.barcode(),
+        ink.code()
+    )
+}
+
+/// Makes an ink of another maker one of the user's own.
+pub fn add_ink(name: &str, colour: &str, ink: Ink) -> Result<String> {
+    let (own, path) = own_inks::add(name, colour, ink)?;
+    Ok(format!(
+        "{}in {}\nName layers and spot colours {name}; `foilpress inks remove {name}` removes it\n",
+        ink_line(&own),
+        path.display(),
+        name = own.name()
+    ))
 }
 
 /// Writes a library as one archive.
@@ -68,7 +93,7 @@ pub fn import(path: &Path, name: Option<String>) -> Result<String> {
     installed(&suggested(path, name), &members, path)
 }
 
-/// The libraries that were added, a line each. One that cannot be used says so.
+/// The libraries and inks that were added, a line each. A library that cannot be used says so.
 pub fn list(json: bool) -> Result<String> {
     let opened = |name: String| {
         let library = libraries::added(&name)
@@ -84,20 +109,25 @@ pub fn list(json: bool) -> Result<String> {
             }
             Err(error) => serde_json::json!({ "name": name, "error": format!("{error:#}") }),
         };
-        return Ok(serde_json::to_string_pretty(&all.iter().map(row).collect::<Vec<_>>())? + "\n");
+        let ink = |own: &Own| serde_json::json!({ "name": own.name(), "colour": own.colour(), "poses_as": own.poses_as().name() });
+        let rows: Vec<_> = all.iter().map(row).chain(own::all().iter().map(ink)).collect();
+        return Ok(serde_json::to_string_pretty(&rows)? + "\n");
     }
-    if all.is_empty() {
+    if all.is_empty() && own::all().is_empty() {
         return Ok("no library was added; `foilpress inks add DIR` adds one\n".into());
     }
     let line = |(name, library): &(String, Result<Library>)| match library {
         Ok(library) => format!("{name:<16} {}\n", library.origins()),
         Err(_) => format!("{name:<16} cannot be used; see `foilpress inks check {name}`\n"),
     };
-    Ok(all.iter().map(line).collect())
+    Ok(all.iter().map(line).chain(own::all().iter().map(ink_line)).collect())
 }
 
-/// Removes a library that was added.
+/// Removes an ink or a library that was added.
 pub fn remove(name: &str) -> Result<String> {
+    if let Some(path) = own_inks::remove(name)? {
+        return Ok(format!("{name}: removed from {}\n", path.display()));
+    }
     let folder = libraries::remove(name)?;
     Ok(format!("{name}: removed from {}\n", folder.display()))
 }
