@@ -238,32 +238,29 @@ impl View {
         (size, dpi): ((usize, usize), u16),
         drawn: Window,
     ) -> Result<Result<View, Cut>, LayoutError> {
-        let dots = |pixels: usize| (pixels * 600 / usize::from(dpi)) as i64;
-        let mm = Mm::of_dots;
+        let dots = |pixels: usize| pixels * 600 / usize::from(dpi);
+        let mm = |dots: usize| Mm::of_dots(dots as i64);
         // A mirrored page is turned about its middle.
         let left = match layout.mirror {
             true => size.0.saturating_sub(drawn.left + drawn.width),
             false => drawn.left,
         };
-        let corner = (dots(left), dots(drawn.top));
+        let (left, top) = (dots(left), dots(drawn.top));
         let position = match place {
-            Place::Page => Position::FromEdge(Point(mm(corner.0), mm(corner.1))),
+            Place::Page => Position::FromEdge(Point(mm(left), mm(top))),
             Place::Centre => Position::Centred,
             Place::At(corner) => Position::FromEdge(corner),
         };
         let (width, length) = (dots(drawn.width), dots(drawn.height));
-        let ((x, y), beyond) =
-            Layout { position, ..layout.clone() }.placed((width as usize, length as usize))?;
+        let ((x, y), beyond) = Layout { position, ..layout.clone() }.placed((width, length))?;
+        let corner = Point(Mm::of_dots(x - left as i64), Mm::of_dots(y - top as i64));
         Ok(match beyond {
             Some(cut)
                 if cut.left.max(cut.right) >= mm(width).0 || cut.top.max(cut.bottom) >= mm(length).0 =>
             {
                 Err(cut)
             }
-            beyond => Ok(View {
-                position: Position::FromPrintable(Point(mm(x - corner.0), mm(y - corner.1))),
-                beyond,
-            }),
+            beyond => Ok(View { position: Position::FromPrintable(corner), beyond }),
         })
     }
 }
