@@ -3,7 +3,6 @@
 use rayon::prelude::*;
 
 use super::window::Window;
-use sheet::Area;
 use sheet::Plane;
 
 /// A plane without ink.
@@ -49,12 +48,6 @@ pub(super) fn bounds(plane: &Plane) -> Option<Window> {
     let left = 8 * first + dots[first].leading_zeros() as usize;
     let right = 8 * last + 7 - dots[last].trailing_zeros() as usize;
     Some(Window { left, top, width: right + 1 - left, height: bottom + 1 - top })
-}
-
-/// The part of a plane in a window, which lies within it.
-pub(super) fn cut(plane: &Plane, &Window { left, top, width, height }: &Window) -> Plane {
-    let rows = plane.rows_in(Area { left, top, width, length: height });
-    Plane { width, length: height, stride: width.div_ceil(8), bits: rows.flatten().collect() }
 }
 
 /// Combines `with` into `plane` byte by byte. Both have the same size.

@@ -3,14 +3,14 @@
 //! Problem: a browser's screenshot has a pixel for four dots each way, and its letters fade into the ground. Drawn as pixels they have
 //! steps, drawn as tones they are specks.
 //! Method: a dot lies between four pixels. If these are about one colour, the dot is a tone between them. Otherwise the two that differ most
-//! are followed to where the picture differs no more, at most [`FAR_MM`] away: to the two colours of an edge, of which one at least
-//! fills 2 x 2 pixels. If the four lie between these two colours, within [`OFF`], each has a coverage, and the dot has one of the two
+//! are followed to where the picture differs no more, at most [`Rules::far_mm`] away: to the two colours of an edge, of which one at least
+//! fills 2 x 2 pixels. If the four lie between these two colours, within [`Rules::off`], each has a coverage, and the dot has one of the two
 //! colours: by whether the coverage between the pixels is half. What is left is a tone.
 //! Where pixels are dots, one that is softened takes the nearer of the two colours.
 //! A stroke may be nowhere as dark as it was drawn. So the colour of one that fills no 2 x 2 pixels is the one that is farthest from the
-//! ground where the stroke goes on within [`FAR_MM`], unless less than [`STROKE`] of that colour is left here.
+//! ground where the stroke goes on within [`Rules::far_mm`], unless less than [`Rules::stroke`] of that colour is left here.
 //! Cost: 5 ns a dot, some 300 ns at an edge; a byte a pixel. Limits: corners are rounded by half a pixel; what is fainter than
-//! [`TONE`] is a tone.
+//! [`Rules::tone`] is a tone.
 
 use std::ops::Range;
 
@@ -18,16 +18,24 @@ use rayon::prelude::*;
 
 use super::key::{DRAWN, Key, colour, key};
 
-/// The largest difference in red, green or blue of pixels that are a tone.
-const TONE: u8 = 12;
-/// How far a pixel's colour may lie from the line between those of an edge.
-const OFF: f32 = 20.0;
-/// How far away the colours of an edge may lie.
-const FAR_MM: f64 = 1.0;
-/// So many of a pixel and its eight neighbours that are about one colour are an area; along a softened edge there are three.
-const AREA: usize = 5;
-/// The least part of a stroke's colour that is the stroke.
-const STROKE: f32 = 0.6;
+/// What an edge is. A test moves each of these by a fifth.
+#[derive(Clone, Copy)]
+pub(super) struct Rules {
+    /// The largest difference in red, green or blue of pixels that are a tone.
+    pub tone: u8,
+    /// How far a pixel's colour may lie from the line between those of an edge.
+    pub off: f32,
+    /// How far away the colours of an edge may lie.
+    pub far_mm: f64,
+    /// So many of a pixel and its eight neighbours that are about one colour are an area; along a softened edge there are three.
+    pub area: usize,
+    /// The least part of a stroke's colour that is the stroke.
+    pub stroke: f32,
+}
+
+impl Rules {
+    pub const USUAL: Rules = Rules { tone: 12, off: 20.0, far_mm: 1.0, area: 5, stroke: 0.6 };
+}
 
 /// A picture whose edges are hard at the dots.
 pub(super) struct Edges<F> {
@@ -40,6 +48,7 @@ pub(super) struct Edges<F> {
     /// Pixels that have 2 x 2 of one colour near.
     near: Vec<bool>,
     far: usize,
+    rules: Rules,
     /// Whether there is a pixel for each dot.
     are_dots: bool,
 }
@@ -54,13 +63,18 @@ enum Between {
 
 impl<F: Fn(usize, usize) -> Key + Sync> Edges<F> {
     /// Of so many pixels and dots; `dpi` is that of the pixels.
-    pub fn new(pixel: F, (width, height): (usize, usize), dots: (usize, usize)) -> Edges<F> {
+    pub fn new(pixel: F, size: (usize, usize), dots: (usize, usize)) -> Edges<F> {
+        Edges::by(Rules::USUAL, pixel, size, dots)
+    }
+
+    /// The same by these rules.
+    pub fn by(rules: Rules, pixel: F, (width, height): (usize, usize), dots: (usize, usize)) -> Edges<F> {
         let are_dots = (width, height) == dots;
         let dpi = 600.0 * (width as f64 / dots.0 as f64).max(height as f64 / dots.1 as f64);
-        let far = ((FAR_MM * dpi / 25.4).round() as usize).clamp(2, 8);
+        let far = ((rules.far_mm * dpi / 25.4).round() as usize).clamp(2, 8);
         let near = near_flat(&pixel, (width, height), far);
         let (columns, rows) = (between(dots.0, width), between(dots.1, height));
-        Edges { pixel, width, height, columns, rows, near, far, are_dots }
+        Edges { pixel, width, height, columns, rows, near, far, rules, are_dots }
     }
 
     /// The colours of rows of dots.
@@ -98,7 +112,7 @@ impl<F: Fn(usize, usize) -> Key + Sync> Edges<F> {
         if keys.iter().all(|&key| key == keys[0]) {
             return Between::Plain(keys[0]);
         }
-        if is_tone(&keys) || !self.near[top * self.width + left] {
+        if self.is_tone(&keys) || !self.near[top * self.width + left] {
             return Between::Tone(keys);
         }
         self.edge(&places, keys).unwrap_or(Between::Tone(keys))
@@ -112,8 +126,8 @@ impl<F: Fn(usize, usize) -> Key + Sync> Edges<F> {
             return Between::Plain(own);
         }
         let places: Vec<(usize, usize)> = self.around((x, y)).collect();
-        let like = places.iter().filter(|place| is_tone(&[own, self.at(**place)])).count();
-        if like >= AREA {
+        let like = places.iter().filter(|place| self.is_tone(&[own, self.at(**place)])).count();
+        if like >= self.rules.area {
             return Between::Plain(own);
         }
         self.edge(&places, [own; 4]).unwrap_or(Between::Plain(own))
@@ -131,7 +145,7 @@ impl<F: Fn(usize, usize) -> Key + Sync> Edges<F> {
         let second = self.follow(b, light(self.at(first)))?;
         let first = self.follow(first, light(self.at(second)))?;
         let (ground, stroke) = match (self.is_flat(first), self.is_flat(second)) {
-            (true, true) => return Between::of(self.at(first), self.at(second), keys),
+            (true, true) => return self.of(self.at(first), self.at(second), keys),
             (true, false) => (first, second),
             (false, true) => (second, first),
             (false, false) => {
@@ -144,7 +158,25 @@ impl<F: Fn(usize, usize) -> Key + Sync> Edges<F> {
         let (ground, here) = (self.at(ground), self.at(stroke));
         let farthest = self.stroke(stroke, ground);
         let left = part(light(ground), light(farthest), light(here)).0;
-        Between::of(ground, if left >= STROKE { farthest } else { here }, keys)
+        self.of(ground, if left >= self.rules.stroke { farthest } else { here }, keys)
+    }
+
+    /// Between two colours, if the four pixels are.
+    fn of(&self, first: Key, second: Key, keys: [Key; 4]) -> Option<Between> {
+        let (from, to) = (light(first), light(second));
+        let parts = keys.map(|key| part(from, to, light(key)));
+        let all = first != second && parts.iter().all(|&(_, off)| off <= self.rules.off);
+        let covered = parts.map(|(part, _)| (255.0 * part.clamp(0.0, 1.0)).round() as u8);
+        all.then_some(Between::Edge([first, second], covered))
+    }
+
+    /// Whether pixels are about one colour.
+    fn is_tone(&self, keys: &[Key]) -> bool {
+        (0..3).all(|c| {
+            let range =
+                keys.iter().map(|&key| colour(key)[c]).fold((255, 0), |(a, b), v| (v.min(a), v.max(b)));
+            range.1.saturating_sub(range.0) <= self.rules.tone
+        })
     }
 
     fn at(&self, (x, y): (usize, usize)) -> Key {
@@ -219,7 +251,7 @@ impl<F: Fn(usize, usize) -> Key + Sync> Edges<F> {
                 }
                 let colour = light(self.at(next));
                 let (left, off) = part(ground, own, colour);
-                if left >= STROKE && off <= OFF {
+                if left >= self.rules.stroke && off <= self.rules.off {
                     open.push(next);
                     let far = square(minus(colour, ground));
                     if far > best {
@@ -230,25 +262,6 @@ impl<F: Fn(usize, usize) -> Key + Sync> Edges<F> {
         }
         self.at(best_at)
     }
-}
-
-impl Between {
-    /// Between two colours, if the four pixels are.
-    fn of(first: Key, second: Key, keys: [Key; 4]) -> Option<Between> {
-        let (from, to) = (light(first), light(second));
-        let parts = keys.map(|key| part(from, to, light(key)));
-        let all = first != second && parts.iter().all(|&(_, off)| off <= OFF);
-        let covered = parts.map(|(part, _)| (255.0 * part.clamp(0.0, 1.0)).round() as u8);
-        all.then_some(Between::Edge([first, second], covered))
-    }
-}
-
-/// Whether pixels are about one colour.
-fn is_tone(keys: &[Key]) -> bool {
-    (0..3).all(|c| {
-        let range = keys.iter().map(|&key| colour(key)[c]).fold((255, 0), |(a, b), v| (v.min(a), v.max(b)));
-        range.1.saturating_sub(range.0) <= TONE
-    })
 }
 
 /// How far on the way from one colour to another a third is, and how far beside it.

@@ -7,7 +7,7 @@
 //! Cost: n⁵ / 24 for n stacks, 2 ms for sixteen; a microsecond a colour. Limits: a colour on or outside the hull takes the nearest tetrahedron's
 //! mixture.
 
-use super::intent::Light;
+use super::intent::{Light, cross, dot, luminance, minus};
 
 /// Corners that lie in a plane up to this make no tetrahedron, and heights that differ by it are equal.
 const NEAR: f64 = 1e-9;
@@ -21,18 +21,6 @@ struct Tetrahedron {
 
 /// The tetrahedra of some stacks.
 pub(super) struct Even(Vec<Tetrahedron>);
-
-fn minus(a: Light, b: Light) -> Light {
-    std::array::from_fn(|c| a[c] - b[c])
-}
-
-fn dot(a: Light, b: Light) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: Light, b: Light) -> Light {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
 
 impl Tetrahedron {
     fn new(corners: [usize; 4], points: &[Light]) -> Option<Tetrahedron> {
@@ -54,7 +42,7 @@ impl Tetrahedron {
 impl Even {
     /// Of stacks with these colours, between black and paper in linear light.
     pub fn new(points: &[Light]) -> Even {
-        let height = |p: Light| (0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2]).powi(2);
+        let height = |p: Light| luminance(p).powi(2);
         let n = points.len();
         let mut found = Vec::new();
         for a in 0..n {
@@ -90,10 +78,6 @@ impl Even {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-
-    fn luminance(p: Light) -> f64 {
-        0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2]
-    }
 
     proptest! {
         /// No other mixture of four stacks with that colour has less variance: all of them are tried.

@@ -155,11 +155,10 @@ impl Numbered {
         Some(Window { left, top, width: right + 1 - left, height: bottom + 1 - top })
     }
 
-    /// The colours in a window, which lies within the page, and the dots that have any; no colours if all are white.
-    pub fn colour(self, window: &Window) -> (Option<Colour>, Plane) {
-        let index = window.cut(self.index, self.width, 1);
+    /// Its colours, and the dots that have any; no colours if all are white.
+    pub fn colour(self) -> (Option<Colour>, Plane) {
         let is_white = |number: u8| self.colours[usize::from(number)].1 == [255; 3];
-        let drawn = bitplane::from_bytes(window.width, &index, |number| !is_white(number));
-        (Colour::numbered(self.colours, index, window.width), drawn)
+        let drawn = bitplane::from_bytes(self.width, &self.index, |number| !is_white(number));
+        (Colour::numbered(self.colours, self.index, self.width), drawn)
     }
 }

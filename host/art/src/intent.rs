@@ -45,21 +45,26 @@ const TRIED: usize = 17;
 /// A colour in linear light; 0 is black, 1 is paper.
 pub(super) type Light = [f64; 3];
 
+/// The luminance of a colour: that of sRGB (IEC 61966-2-1).
+pub(super) fn luminance([r, g, b]: Light) -> f64 {
+    0.2126 * r + 0.7152 * g + 0.0722 * b
+}
+
 /// What mixtures of stacks can reach.
 pub(super) struct Hull {
     /// Half spaces: normal and distance. Inside, `normal . colour <= distance`.
     faces: Vec<(Light, f64)>,
 }
 
-fn dot(a: Light, b: Light) -> f64 {
+pub(super) fn dot(a: Light, b: Light) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-fn minus(a: Light, b: Light) -> Light {
+pub(super) fn minus(a: Light, b: Light) -> Light {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-fn cross(a: Light, b: Light) -> Light {
+pub(super) fn cross(a: Light, b: Light) -> Light {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 

@@ -16,20 +16,20 @@ pub(super) const WHITE: Key = 0xff_ff_ff;
 pub(super) const BLACK: Key = 0;
 
 /// The key of a colour. White is white and black is black, whatever drew it.
-#[inline]
+#[inline(always)]
 pub(super) fn key([r, g, b]: [u8; 3], drawn: bool) -> Key {
     let rgb = u32::from_be_bytes([0, r, g, b]);
     if drawn && rgb != WHITE && rgb != BLACK { rgb | DRAWN } else { rgb }
 }
 
 /// The key of what is drawn; `labels` says whether text is a label.
-#[inline]
+#[inline(always)]
 pub(super) fn of_drawn(kind: ObjectType, rgb: [u8; 3], labels: bool) -> Key {
     let key = key(rgb, kind != ObjectType::Picture);
     if labels && kind == ObjectType::Text { key | LABEL } else { key }
 }
 
-#[inline]
+#[inline(always)]
 pub(super) fn colour(key: Key) -> [u8; 3] {
     let [_, r, g, b] = key.to_be_bytes();
     [r, g, b]

@@ -41,7 +41,7 @@ impl ObjectType {
     pub(super) const TEXT: u8 = 1;
 
     /// The kind that one of Ghostscript's tags means.
-    #[inline]
+    #[inline(always)]
     pub(super) fn of(tag: u8) -> ObjectType {
         match tag {
             tag if tag & ObjectType::PICTURE != 0 => ObjectType::Picture,

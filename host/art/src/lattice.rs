@@ -105,12 +105,21 @@ impl Nodes {
     }
 }
 
-/// How far inside the cube nodes are still tints in part, in nodes from an edge of the cube.
-const NEAR: f64 = 4.0;
-/// The same for the lines from white, as a share of the distance from white.
-const NEAR_IN_HUE: f64 = 1.0 / 8.0;
+/// How far inside the cube nodes are still tints in part. A test moves each by a fifth.
+#[derive(Clone, Copy)]
+pub(super) struct Near {
+    /// In nodes from an edge of the cube.
+    pub edge: f64,
+    /// For the lines from white, as a share of the distance from white.
+    pub hue: f64,
+}
 
-/// Up to so many nodes between its channels a colour is about grey.
+impl Near {
+    pub const USUAL: Near = Near { edge: 4.0, hue: 1.0 / 8.0 };
+}
+
+/// Up to so many nodes between its channels a colour is about grey: colours whose channels differ by less than a node lie between such
+/// nodes only, and there is nothing less but none.
 const GREY: usize = 1;
 
 /// What a colour is made of as tints: paper, a primary, and the secondary towards which its hue is turned.
@@ -123,7 +132,7 @@ struct Tint {
 
 impl Tint {
     /// The tint nearest to a node; `None` for greys.
-    fn of(node: [usize; 3], amount: impl Fn(f64) -> f64) -> Option<Tint> {
+    fn of(node: [usize; 3], near: Near, amount: impl Fn(f64) -> f64) -> Option<Tint> {
         let mut order = [(node[0], 4), (node[1], 2), (node[2], 1)];
         order.sort_by_key(|&(level, _)| std::cmp::Reverse(level));
         let [most, middle, least] = order.map(|(level, _)| level as f64);
@@ -135,8 +144,8 @@ impl Tint {
         };
         let along = towards([most, middle, least]);
         let (dark, pale) = ((NODES - 1) as f64 - most, least);
-        let off_line = along.min(1.0 - along) / NEAR_IN_HUE;
-        let part = (1.0 - dark / NEAR).max(0.0) * (1.0 - off_line.min(pale / NEAR)).max(0.0);
+        let off_line = along.min(1.0 - along) / near.hue;
+        let part = (1.0 - dark / near.edge).max(0.0) * (1.0 - off_line.min(pale / near.edge)).max(0.0);
         let amount = [most, middle, least].map(|level| amount(level / (NODES - 1) as f64));
         let (paper, second) = (amount[2] / amount[0], towards(amount));
         let (primary, secondary) = (order[0].1, order[0].1 | order[1].1);
@@ -153,6 +162,7 @@ impl Tint {
 pub(super) fn with_tints(
     mix: InkMix,
     lattice: usize,
+    near: Near,
     amount: impl Fn(f64) -> f64,
     named: impl Fn([u8; 3]) -> Option<Stack>,
 ) -> Result<InkMix, WeightError> {
@@ -165,7 +175,7 @@ pub(super) fn with_tints(
     wider.changed(|node, out| {
         let Some(node) = node.checked_sub(lattice * ALL).filter(|&node| node < ALL) else { return };
         let at = [node / (NODES * NODES), node / NODES % NODES, node % NODES];
-        let Some(Tint { parts, part }) = Tint::of(at, &amount) else { return };
+        let Some(Tint { parts, part }) = Tint::of(at, near, &amount) else { return };
         let parts = parts.map(|(corner, share)| (corners[corner], share));
         if part == 0.0 || parts.iter().any(|&(corner, share)| corner.is_none() && share > 0.0) {
             return;
@@ -367,6 +377,30 @@ mod tests {
             let (node, part) = step(value);
             let at = (node as f64 + f64::from(part) / 256.0) / (NODES - 1) as f64;
             prop_assert!((at - value as f64 / 255.0).abs() < 1.0 / 4000.0);
+        }
+    }
+
+    proptest! {
+        /// So what is kept for the nodes about grey is kept for these colours.
+        #[test]
+        fn colours_that_differ_by_less_than_a_node_lie_between_nodes_about_grey(
+            base in 0u8..=255, off in prop::array::uniform3(0u8..=15)
+        ) {
+            let at = off.map(|off| step(usize::from(base.saturating_add(off))));
+            let mut axes = [0, 1, 2];
+            axes.sort_by_key(|&axis| std::cmp::Reverse(at[axis].1));
+            let mut node = at.map(|(node, _)| node);
+            let about_grey = |node: [usize; 3]| {
+                node.iter().max().unwrap() - node.iter().min().unwrap() <= GREY
+            };
+            let mut last = 256;
+            for next in axes.map(|axis| at[axis].1).into_iter().chain([0]).zip(axes.map(Some).into_iter().chain([None])) {
+                prop_assert!(last == next.0 || about_grey(node), "{node:?}");
+                last = next.0;
+                if let Some(axis) = next.1 {
+                    node[axis] += 1;
+                }
+            }
         }
     }
 }

@@ -3,7 +3,7 @@
 //! Problem: print systems hand over whole sheets, most of which is bare, at four bytes a pixel; and most pages are black text.
 //! Method: as long as a page is black and white alone, it is kept as one bit a pixel while it is read: what drew a black pixel
 //! does not matter. With the first other colour, its pixels become numbers of colours (`indexed_page`), and with the first tone of a
-//! picture, pixels. The window around everything drawn is cut out and read as a picture.
+//! picture, pixels. So the whole page is read as a picture.
 //! Cost: 1 ns a pixel; a bit, a byte or four bytes. Limits: no transparency.
 
 use std::io::{self, Read};
@@ -91,50 +91,46 @@ impl Page {
         }
     }
 
-    /// The part of a page in a window as art. The page was drawn at `dpi` pixels an inch.
+    /// The page as art. It was drawn at `dpi` pixels an inch.
     ///
     /// # Errors
-    /// A window that does not lie within the page, or has no dots or more than 65535 on a side.
-    pub fn art(self, name: &str, window: &Window, dpi: u16, options: &Options) -> Result<Artwork, Diagnosis> {
-        let (wide, high) = (window.width, window.height);
-        let problem = || {
-            let problem = format!("the page is {wide} x {high} pixels; expected 1 to 65535 dots on a side");
-            wrong(Path::new(name), problem)
-        };
+    /// No dots, or more than 65535 on a side.
+    pub fn art(self, name: &str, dpi: u16, options: &Options) -> Result<Artwork, Diagnosis> {
         let (width, height) = match &self.0 {
             Pixels::Black(plane) => (plane.width, plane.length),
             Pixels::Numbered(page) => (page.width, page.length()),
             Pixels::Plain(rgb, width) => (*width, rgb.len() / 3 / (*width).max(1)),
             Pixels::Tagged(pixels, width) => (*width, pixels.len() / BYTES / (*width).max(1)),
         };
-        let fits = window.left + wide <= width && window.top + high <= height;
-        let dots = size::page_dots((wide, high), dpi.into()).filter(|_| fits).ok_or_else(problem)?;
+        let problem = || {
+            let problem =
+                format!("the page is {width} x {height} pixels; expected 1 to 65535 dots on a side");
+            wrong(Path::new(name), problem)
+        };
+        let dots = size::page_dots((width, height), dpi.into()).ok_or_else(problem)?;
         let side = |pixels: usize| u32::try_from(pixels).map_err(|_| problem());
-        let size = (side(wide)?, side(high)?);
+        let size = (side(width)?, side(height)?);
         Ok(match self.0 {
             Pixels::Black(plane) if dpi == DOTS && !options.reserves() => {
-                let drawn = bitplane::cut(&plane, window);
-                let colour = Some(Colour::black(drawn.clone()));
-                Artwork { drawn, colour, ..Artwork::blank(name, dots) }
+                let colour = Some(Colour::black(plane.clone()));
+                Artwork { drawn: plane, colour, ..Artwork::blank(name, dots) }
             }
             Pixels::Black(plane) => {
                 let mut pixels = vec![0; BYTES * width * height];
                 expand(&plane, &mut pixels);
-                tagged(name, window.cut(pixels, width, BYTES), size, dots, options)
+                tagged(name, pixels, size, dots, options)
             }
             Pixels::Numbered(page) if dpi == DOTS && !options.reserves() => {
-                let (colour, drawn) = page.colour(window);
+                let (colour, drawn) = page.colour();
                 Artwork { drawn, colour, ..Artwork::blank(name, dots) }
             }
             Pixels::Numbered(page) => {
                 let mut pixels = vec![0; BYTES * width * height];
                 page.expand(&mut pixels);
-                tagged(name, window.cut(pixels, width, BYTES), size, dots, options)
+                tagged(name, pixels, size, dots, options)
             }
-            Pixels::Tagged(pixels, _) => tagged(name, window.cut(pixels, width, BYTES), size, dots, options),
-            Pixels::Plain(rgb, _) => {
-                picture::opaque_artwork::<3>(name, name, size, dots, window.cut(rgb, width, 3), options)
-            }
+            Pixels::Tagged(pixels, _) => tagged(name, pixels, size, dots, options),
+            Pixels::Plain(rgb, _) => picture::opaque_artwork::<3>(name, name, size, dots, rgb, options),
         })
     }
 }
@@ -209,7 +205,7 @@ mod tests {
                 prop::collection::vec(any::<usize>(), 900),
             ],
             most in prop_oneof![Just(1u32), Just(5), Just(256)],
-            tag_last: bool, draft: bool, part in (0usize..3, 0usize..3, 0usize..3, 0usize..3)
+            tag_last: bool, draft: bool
         ) {
             let is_black = tone.is_none() && colours.is_empty();
             let pixels = page((width, height), seed, (colours, most), tone);
@@ -227,16 +223,9 @@ mod tests {
             prop_assert!(!numbered || tone.is_none() && !is_black);
             prop_assert!(numbered || tone.is_some() || is_black || most > 5);
             prop_assert_eq!(found.bounds(), whole.bounds());
-            let (left, top) = (part.0.min(width - 1), part.1.min(height - 1));
-            let window = Window {
-                left,
-                top,
-                width: (width - left).saturating_sub(part.2).max(1),
-                height: (height - top).saturating_sub(part.3).max(1),
-            };
             let (dpi, options) = (if draft { 300 } else { 600 }, Options::default());
-            let found = found.art("page", &window, dpi, &options).unwrap();
-            let whole = whole.art("page", &window, dpi, &options).unwrap();
+            let found = found.art("page", dpi, &options).unwrap();
+            let whole = whole.art("page", dpi, &options).unwrap();
             prop_assert_eq!(&found.drawn, &whole.drawn);
             // What nothing is drawn on has no colour.
             if whole.drawn.dots() > 0 {
@@ -248,11 +237,8 @@ mod tests {
     }
 
     #[test]
-    fn a_page_cut_short_and_a_window_beyond_it_are_errors() {
+    fn a_page_cut_short_is_an_error() {
         let pixels = page((9, 40), 1, (Vec::new(), 1), None);
         assert!(Page::read(&mut &pixels[..pixels.len() - 1], Order::First, (9, 40)).is_err());
-        let page = Page::read(&mut &pixels[..], Order::First, (9, 40)).unwrap();
-        let beyond = Window { left: 1, top: 0, width: 9, height: 9 };
-        assert!(page.art("page", &beyond, 600, &Options::default()).is_err());
     }
 }

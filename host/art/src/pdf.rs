@@ -204,10 +204,14 @@ impl Document<'_> {
         Ok(Scan::of_page(self.path, (pixels.width, pixels.height), &pixels.rgba))
     }
 
-    /// The resolution at which a page has its final number of dots.
+    /// The resolution at which a page has its final number of dots: that of the printer, as in a print queue, unless a size is set.
+    /// The program that draws rounds the sides of a page as the printer needs it.
     fn dpi(&self, leaf: &Leaf, notes: &mut Vec<String>) -> Result<(f64, f64), Diagnosis> {
         let unstated = Unstated::Drawing { rounded_mm: leaf.rounded_mm };
         let dots = size::dots(self.path, leaf.size, Some((DRAFT, DRAFT)), unstated, self.options, notes)?;
+        if self.options.size.is_none() {
+            return Ok((size::DPI * self.options.across.max(1) as f64, size::DPI));
+        }
         Ok((DRAFT * dots.0 as f64 / leaf.size.0, DRAFT * dots.1 as f64 / leaf.size.1))
     }
 }

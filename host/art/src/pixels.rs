@@ -13,6 +13,10 @@ use super::key::{BLACK, DRAWN, Key, colour, key, of_drawn};
 use super::kinds::{BYTES, K_OF_PICTURES, ObjectType, split};
 use super::resample;
 use appearance::srgb;
+use appearance::wide::wide;
+
+/// Pixels that are looked at together: most of a page is paper.
+const BLOCK: usize = 32;
 
 /// Writes the colours of rows of dots.
 pub(super) type Rows<'a> = dyn Fn(Range<usize>, &mut [Key]) + Sync + 'a;
@@ -51,7 +55,7 @@ impl Pixels {
     }
 }
 
-#[inline]
+#[inline(always)]
 fn key_of<const N: usize>(pixel: &[u8; N], labels: bool) -> Key {
     match split(pixel) {
         (ObjectType::Picture, K_OF_PICTURES) if N == BYTES => BLACK,
@@ -69,7 +73,18 @@ fn row<const N: usize>(
     let rows = resample::pixels(y, height, dots.1);
     if dots.0 == width && rows.len() == 1 {
         let row = &pixels[rows.start * width..][..width];
-        out.iter_mut().zip(row).for_each(|(out, pixel)| *out = key_of(pixel, labels));
+        wide(
+            #[inline(always)]
+            || {
+                for (out, pixels) in out.chunks_mut(BLOCK).zip(row.chunks(BLOCK)) {
+                    if pixels.iter().fold(true, |all, pixel| all & (*pixel == pixels[0])) {
+                        out.fill(key_of(&pixels[0], labels));
+                    } else {
+                        out.iter_mut().zip(pixels).for_each(|(out, pixel)| *out = key_of(pixel, labels));
+                    }
+                }
+            },
+        );
         return;
     }
     let mut under = Vec::new();

@@ -20,7 +20,9 @@ pub(super) const MOST_PIXELS: u64 = 1 << 28;
 pub(super) const MOST_BYTES: u64 = 1 << 30;
 
 /// Millimetres in a dot.
-pub(super) const MM: f64 = 25.4 / 600.0;
+pub(super) const MM: f64 = 25.4 / DPI;
+/// Dots in an inch, across and down; there are `Options::across` times as many across.
+pub(super) const DPI: f64 = 600.0;
 
 /// Refuses absurd sizes before anything is allocated.
 pub(super) fn check_pixels(path: &Path, width: u32, height: u32) -> Result<(), Diagnosis> {

@@ -44,31 +44,6 @@ impl Window {
         let bottom = (self.top + self.height).max(other.top + other.height);
         Window { left, top, width: right - left, height: bottom - top }
     }
-
-    /// The common part of both, if they overlap.
-    pub fn meet(&self, other: &Window) -> Option<Window> {
-        let (left, top) = (self.left.max(other.left), self.top.max(other.top));
-        let right = (self.left + self.width).min(other.left + other.width);
-        let bottom = (self.top + self.height).min(other.top + other.height);
-        (left < right && top < bottom).then(|| Window {
-            left,
-            top,
-            width: right - left,
-            height: bottom - top,
-        })
-    }
-
-    /// The pixels inside the window, which lies within the picture. A pixel has `bytes` bytes, a row has `width` pixels.
-    pub fn cut(&self, mut pixels: Vec<u8>, width: usize, bytes: usize) -> Vec<u8> {
-        let row = bytes * self.width;
-        // In place, since no row moves to a later byte.
-        for y in 0..self.height {
-            let from = bytes * ((self.top + y) * width + self.left);
-            pixels.copy_within(from..from + row, y * row);
-        }
-        pixels.truncate(self.height * row);
-        pixels
-    }
 }
 
 #[cfg(test)]
@@ -77,23 +52,6 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        #[test]
-        fn a_pixel_is_in_what_windows_have_in_common_if_it_is_in_both(sides: [(u8, u8, u8, u8); 2], at: (u8, u8)) {
-            let [a, b] = sides.map(|(left, top, width, height)| Window {
-                left: usize::from(left / 4),
-                top: usize::from(top / 4),
-                width: usize::from(width / 4),
-                height: usize::from(height / 4),
-            });
-            let at = (usize::from(at.0 / 2), usize::from(at.1 / 2));
-            let has = |window: &Window| {
-                (window.left..window.left + window.width).contains(&at.0)
-                    && (window.top..window.top + window.height).contains(&at.1)
-            };
-            prop_assert_eq!(a.meet(&b).is_some_and(|both| has(&both)), has(&a) && has(&b));
-            prop_assert!(!has(&a) && !has(&b) || has(&a.join(&b)));
-        }
-
         #[test]
         fn what_is_drawn_lies_in_its_window_and_touches_all_its_sides(
             width in 1usize..40,
@@ -111,10 +69,6 @@ mod tests {
                 let ys = || drawn.iter().map(|pixel| pixel.1);
                 prop_assert_eq!((window.left, window.left + window.width - 1), (xs().min().unwrap(), xs().max().unwrap()));
                 prop_assert_eq!((window.top, window.top + window.height - 1), (ys().min().unwrap(), ys().max().unwrap()));
-                let cut = window.cut(pixels.clone(), width, 3);
-                let rows = pixels.chunks_exact(3 * width).skip(window.top).take(window.height);
-                let rows: Vec<_> = rows.map(|row| &row[3 * window.left..3 * (window.left + window.width)]).collect();
-                prop_assert_eq!(cut, rows.concat());
             }
         }
     }

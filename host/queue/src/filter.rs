@@ -4,8 +4,8 @@
 //! Method: a PDF is drawn by Ghostscript, which also tells what drew each pixel; each page becomes art as if it were a
 //! picture given to `foilpress layers`: text keeps its outline, reserved colours are inks of their own if wanted, everything
 //! else is halftoned in process inks. A page with spot colours that name inks is separated, too, and the plates of these are
-//! layers. The art is laid where the page has it, or where the user wants it, on a sheet of the page's size; what lies on the
-//! margins is reported in millimetres.
+//! layers. The whole page is halftoned, as `foilpress layers` does it, so both make the same dots. It is laid where the user wants what is
+//! drawn on it, on a sheet of the page's size; what lies on the margins is reported in millimetres.
 //! Cost: the page at a bit or four bytes a pixel, and what [`art`] costs; for documents that may have spot colours, one
 //! more drawing of all pages at a low resolution; for those that may have gradients that Ghostscript leaves out, a run
 //! without output.
@@ -281,9 +281,8 @@ fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
         let in_page = |error| FilterError::Layers { page: number, source: of_document(error) };
         let page = art::pdf::separated(path, interpreter, number, dpi.into()).map_err(in_page)?;
         let paper = page::paper(number, page.size, dpi, press.choices)?;
-        if let Some(view) = press.view(number, paper, (page.size, dpi), page.bounds(), false) {
-            let art =
-                page.art(&format!("page {number}"), &view.window, &press.options(dpi)).map_err(in_page)?;
+        if let Some(view) = press.view(number, paper, (page.size, dpi), page.bounds(), false)? {
+            let art = page.art(&format!("page {number}"), &press.options(dpi)).map_err(in_page)?;
             let job = press.job(number, paper, &art, &view, false)?;
             press.write(&job)?;
         }
@@ -338,12 +337,12 @@ fn picture(
     mirrored: bool,
     press: &mut Press<'_>,
 ) -> Result<Vec<u8>, FilterError> {
-    let Some(view) = press.view(number, paper, (size, dpi), page.bounds(), mirrored) else {
+    let Some(view) = press.view(number, paper, (size, dpi), page.bounds(), mirrored)? else {
         return Ok(Vec::new());
     };
     let name = format!("page {number}");
     let art = page
-        .art(&name, &view.window, dpi, &press.options(dpi))
+        .art(&name, dpi, &press.options(dpi))
         .map_err(|source| FilterError::Layers { page: number, source })?;
     press.job(number, paper, &art, &view, mirrored)
 }

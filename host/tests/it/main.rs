@@ -20,6 +20,7 @@ mod missing;
 mod page;
 mod preview;
 mod report;
+mod roads;
 mod scans;
 mod send;
 mod sources;

@@ -16,7 +16,7 @@ use super::*;
 type Light = [f64; 3];
 
 /// Dots along each side of the art, 22 mm.
-const SIDE: usize = 512;
+pub(super) const SIDE: usize = 512;
 
 /// Linear sRGB to XYZ, and XYZ to light, red and green, blue and yellow.
 const XYZ: [Light; 3] =
@@ -123,7 +123,7 @@ fn figure(art: &Art, kind: ObjectType, coarse: usize) -> f64 {
 }
 
 /// The art in pixels of so many dots.
-fn softened(art: &Art, coarse: usize) -> Art {
+pub(super) fn softened(art: &Art, coarse: usize) -> Art {
     Art::new(art.width / coarse, art.height / coarse, |x, y| {
         std::array::from_fn(|c| {
             let all = (0..coarse * coarse).map(|at| (x * coarse + at % coarse, y * coarse + at / coarse));
@@ -164,7 +164,7 @@ fn on(stroke: f64, a: (f64, f64), b: (f64, f64), (x, y): (f64, f64)) -> bool {
 }
 
 /// Lines of text of these sizes in points.
-fn text(sizes: &[f64], ink: [u8; 3], ground: [u8; 3]) -> Art {
+pub(super) fn text(sizes: &[f64], ink: [u8; 3], ground: [u8; 3]) -> Art {
     let mut art = Art::new(SIDE, SIDE, |_, _| ground);
     let mut top = 20.0;
     for (line, &points) in sizes.iter().enumerate() {

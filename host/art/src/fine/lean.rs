@@ -8,6 +8,7 @@
 //! Cost: a look at each dot, and some 100 ns at an edge.
 
 use super::super::key::{Key, colour};
+use super::BLOCK;
 use super::mixtures::{Stops, shares, stops};
 use appearance::weights::ONE;
 
@@ -58,15 +59,15 @@ fn is_edge(a: Key, b: Key) -> bool {
 impl<'a> Leans<'a> {
     #[inline(always)]
     pub fn new(keys: &'a [Key], width: usize) -> Leans<'a> {
-        /// Dots that are looked at together: most have no edge.
-        const BLOCK: usize = 32;
         let mut edges = vec![0; keys.len()];
         let rows = keys.len() / width;
         let mut mark = |from: std::ops::Range<usize>, way: usize, (here, there): (u8, u8)| {
             for start in from.clone().step_by(BLOCK) {
                 let block = start..(start + BLOCK).min(from.end);
                 let (a, b) = (&keys[block.clone()], &keys[block.start + way..block.end + way]);
-                if a.iter().zip(b).fold(0, |other, (a, b)| other | (a ^ b)) == 0 {
+                // Most have no edge: they are of one colour, or not flat.
+                let may_be = |(a, b): (&Key, &Key)| if a != b { a & b & FLAT } else { 0 };
+                if a.iter().zip(b).fold(0, |any, pair| any | may_be(pair)) == 0 {
                     continue;
                 }
                 for at in block.filter(|&at| is_edge(keys[at], keys[at + way])) {

@@ -10,6 +10,7 @@
 use inks::Stack;
 
 use super::super::fit::Fit;
+use super::super::intent::luminance;
 use super::super::lattice::{ALL, NODES};
 use super::super::solids::Solids;
 use appearance::weights::ONE;
@@ -43,11 +44,7 @@ impl<'a, const N: usize> Mixtures<'a, N> {
     /// Of a fit with at most `N` stacks.
     pub fn new(fit: &Fit, solids: &'a Solids<'a>) -> Mixtures<'a, N> {
         let mut numbers: Vec<usize> = (0..fit.stacks.len()).collect();
-        let luminance = |stack: &Stack| {
-            let [r, g, b] = solids.body(stack);
-            0.2126 * r + 0.7152 * g + 0.0722 * b
-        };
-        let of_each: Vec<f64> = fit.stacks.iter().map(luminance).collect();
+        let of_each: Vec<f64> = fit.stacks.iter().map(|stack| luminance(solids.body(stack))).collect();
         numbers.sort_by(|&a, &b| of_each[a].total_cmp(&of_each[b]));
         let (mut order, mut light) = ([0; N], [0.0; N]);
         for (at, &number) in numbers.iter().enumerate() {
@@ -98,13 +95,13 @@ impl<'a, const N: usize> Mixtures<'a, N> {
     }
 
     /// The stops of a colour of a picture, or of text or a drawing.
-    #[inline]
+    #[inline(always)]
     pub fn stops(&self, colour: [u8; 3], drawn: bool) -> Stops<N> {
         self.named(colour).unwrap_or_else(|| self.between(colour, drawn))
     }
 
     /// The stops between the nodes of the lattice.
-    #[inline]
+    #[inline(always)]
     fn between(&self, colour: [u8; 3], drawn: bool) -> Stops<N> {
         let [x, y, z] = colour.map(|v| self.steps[usize::from(v)]);
         let mut axes = [(x.1, NODES * NODES), (y.1, NODES), (z.1, 1)];
@@ -122,8 +119,10 @@ impl<'a, const N: usize> Mixtures<'a, N> {
                 return self.nodes[node];
             }
             if part > 0 {
+                // Fewer than all parts: 16 bits, whose product's upper half is one operation for all stops.
+                let part = (part << 8) as u16;
                 for (sum, &stop) in sums.iter_mut().zip(&self.nodes[node]) {
-                    *sum += ((u32::from(stop) * (part << 8)) >> 16) as u16;
+                    *sum += ((u32::from(stop) * u32::from(part)) >> 16) as u16;
                 }
             }
             (last, node) = (next, node + step);
@@ -160,11 +159,17 @@ impl<'a, const N: usize> Mixtures<'a, N> {
     }
 
     /// The stack, in that order, that a threshold picks.
-    #[inline]
+    #[inline(always)]
     pub fn pick(stops: &Stops<N>, threshold: u16) -> usize {
         let reached: u16 = stops.iter().map(|&stop| u16::from(stop <= threshold)).sum();
         reached.into()
     }
+}
+
+/// Whether one stack is all of a mixture.
+#[inline(always)]
+pub fn is_alone<const N: usize>(stops: &Stops<N>) -> bool {
+    stops.iter().fold(true, |all, &stop| all & (stop == 0 || stop == ONE))
 }
 
 /// The stops of a stack alone.

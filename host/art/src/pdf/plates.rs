@@ -330,29 +330,28 @@ impl Separated {
             .reduce(|all, window| all.join(&window))
     }
 
-    /// The part of the page in a window as art, a layer for each plate.
+    /// The page as art, a layer for each plate.
     ///
     /// # Errors
-    /// A window of no dots, or of more than 65535 on a side.
-    pub fn art(self, name: &str, window: &Window, options: &Options) -> Result<Artwork, Diagnosis> {
-        let empty = || wrong(Path::new(name), "the window has no dots");
-        let dots = size::page_dots((window.width, window.height), self.dpi).ok_or_else(empty)?;
-        Ok(self.art_of(name, window, dots, options))
+    /// A page of no dots, or of more than 65535 on a side.
+    pub fn art(self, name: &str, options: &Options) -> Result<Artwork, Diagnosis> {
+        let empty = || wrong(Path::new(name), "the page has no dots");
+        let dots = size::page_dots(self.size, self.dpi).ok_or_else(empty)?;
+        Ok(self.art_of(name, dots, options))
     }
 
-    /// The whole page as art, a dot for each pixel.
+    /// The same with a dot for each pixel.
     pub(super) fn whole(self, name: &str, options: &Options) -> Artwork {
-        let (width, height) = self.size;
-        self.art_of(name, &Window { left: 0, top: 0, width, height }, (width, height), options)
+        let dots = self.size;
+        self.art_of(name, dots, options)
     }
 
-    fn art_of(self, name: &str, window: &Window, dots: (usize, usize), options: &Options) -> Artwork {
+    fn art_of(self, name: &str, dots: (usize, usize), options: &Options) -> Artwork {
         // The plates were read from TIFF files, whose sides fit in u32.
-        let size = (window.width as u32, window.height as u32);
+        let size = (self.size.0 as u32, self.size.1 as u32);
         let mut art = match self.rest {
             None => Artwork::blank(name, dots),
             Some(pixels) => {
-                let pixels = window.cut(pixels, self.size.0, kinds::BYTES);
                 picture::opaque_artwork::<{ kinds::BYTES }>(name, name, size, dots, pixels, options)
             }
         };
@@ -373,13 +372,13 @@ impl Separated {
                 width: size.0,
                 height: size.1,
                 dpi: None,
-                coverage: window.cut(coverage, self.size.0, 1),
+                coverage,
                 by: Coverage::Dark,
             };
             art.add(scan, &plate, named, true, options);
         }
         if options.cut_lines {
-            self.cuts.into_iter().for_each(|cut| art.add_cut(&window.cut(cut, self.size.0, 1)));
+            self.cuts.iter().for_each(|cut| art.add_cut(cut));
         }
         art.notes.extend(self.notes);
         art

@@ -189,8 +189,7 @@ fn spots_without_an_ink_print_by_their_process_colours_in_layers_and_queue_alike
     // The queue's way.
     assert_eq!(pdf::survey(&file, &Silent).unwrap().spots, [["White"]]);
     let page = pdf::separated(&file, Interpreter::Usual, 1, 600.0).unwrap();
-    let window = Window { left: 0, top: 0, width: page.size.0, height: page.size.1 };
-    let queued = page.art("page", &window, &Options::default()).unwrap();
+    let queued = page.art("page", &Options::default()).unwrap();
     let keys = |art: &Artwork| art.colour.as_ref().map(|colour| colour.keys((art.width, art.length)));
     assert_eq!((amounts(&queued), keys(&queued)), (amounts(&art), keys(&art)));
     // A slip is an error in both.
@@ -219,8 +218,7 @@ fn a_page_keeps_tints_of_its_spot_colours_in_layers_and_queue_alike() {
     let file = bench.write("tint.ps", page);
     let art = read(std::slice::from_ref(&file), &Options::default());
     let separated = pdf::separated(&file, Interpreter::Usual, 1, 600.0).unwrap();
-    let window = Window { left: 0, top: 0, width: separated.size.0, height: separated.size.1 };
-    let queued = separated.art("page", &window, &Options::default()).unwrap();
+    let queued = separated.art("page", &Options::default()).unwrap();
     assert_eq!(amounts(&queued), amounts(&art));
     // Both squares are 400 dots a side.
     let [(Ink::MetallicGold, gold)] = amounts(&art)[..] else { panic!("{:?}", art.notes) };

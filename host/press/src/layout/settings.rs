@@ -4,6 +4,7 @@ use protocol::ink::Ink;
 use protocol::paper::Paper;
 use protocol::rgl::Resolution;
 
+use super::block::Block;
 use super::length::{Mm, Point};
 use super::profile::Profile;
 use super::rect::{Cut, Rect};
@@ -93,6 +94,15 @@ impl Layout {
         let (x, y) = self.profile.offset();
         let reach = Rect { left: x, right: x + width, top: y, bottom: self.profile.lands_on(length - 1) + 1 };
         reach.meet(Rect { left: 0, right: width, top: 0, bottom: length })
+    }
+
+    /// The corner of a copy of so many dots, in dots of the printable area, and what of it lies beyond what the printer reaches.
+    ///
+    /// # Errors
+    /// Settings out of range, and of a layout that does not cut, what is beyond.
+    pub fn placed(&self, size: (usize, usize)) -> Result<((i64, i64), Option<Cut>), LayoutError> {
+        let block = Block::of(size, self)?;
+        Ok(((block.place.left, block.place.top), block.cut))
     }
 
     /// Width and length in dots of the largest copy that can be printed where the position says and as often as the grid says,

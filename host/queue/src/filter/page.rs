@@ -5,7 +5,7 @@ use std::path::Path;
 
 use inks::{InkSet, Library};
 use protocol::ink::{Ink, Kind};
-use protocol::paper::{LEFT, Paper};
+use protocol::paper::Paper;
 
 use super::{FilterError, io_error};
 use crate::options::{Choices, Place, Spots};
@@ -13,7 +13,7 @@ use crate::ppd;
 use art::{Artwork, Room, Window};
 use observe::Observer;
 use press::job::Handling;
-use press::layout::{Cut, Layout, Mm, Point, Position};
+use press::layout::{Cut, Layout, LayoutError, Mm, Point, Position};
 use press::pipeline::{self, JobError, Request};
 use press::separate::CARTRIDGES;
 
@@ -92,8 +92,11 @@ impl Press<'_> {
         }
     }
 
-    /// What of a page is printed, and where. `drawn` is the window around everything on it, none if it is blank. Notes why
-    /// nothing is printed.
+    /// Where a page is printed. `drawn` is the window around everything on it, none if it is blank. Notes why nothing is
+    /// printed.
+    ///
+    /// # Errors
+    /// A layout that does not hold.
     pub(super) fn view(
         &mut self,
         number: usize,
@@ -101,28 +104,33 @@ impl Press<'_> {
         (size, dpi): ((usize, usize), u16),
         drawn: Option<Window>,
         mirrored: bool,
-    ) -> Option<View> {
+    ) -> Result<Option<View>, FilterError> {
         let pages = &self.choices.pages;
         if !pages.is_empty() && !pages.iter().any(|range| range.contains(&number)) {
-            return None;
+            return Ok(None);
         }
         let Some(drawn) = drawn else {
             self.observer.note(&format!("page {number} is blank; the page is skipped"));
-            return None;
+            return Ok(None);
         };
-        // A page is turned about its middle, not what is drawn on it.
-        let whole = mirrored || self.choices.finish == art::Finish::All;
-        match View::of(self.choices.place, paper, (size, dpi), drawn, whole) {
-            Ok(view) => Some(view),
+        let in_layout = |error: LayoutError| FilterError::Job { page: number, source: error.into() };
+        let layout = self.layout(paper, mirrored);
+        match View::of(self.choices.place, &layout, (size, dpi), drawn).map_err(in_layout)? {
+            Ok(view) => Ok(Some(view)),
             Err(beyond) => {
                 self.observer.note(&format!(
                     "everything on page {number} lies on the margins, where the printer cannot print ({beyond}); the page is \
                      skipped"
                 ));
                 self.in_margins.get_or_insert((number, beyond));
-                None
+                Ok(None)
             }
         }
+    }
+
+    /// How a page is laid on its paper, in the middle of it.
+    fn layout(&self, paper: Paper, mirror: bool) -> Layout {
+        Layout { mirror, cut: true, profile: self.choices.profile, ..Layout::centred(paper) }
     }
 
     /// The job of a picture that has no page of its own: in the middle of the sheet, as large as it says or as fits.
@@ -133,14 +141,14 @@ impl Press<'_> {
         let options = art::Options { dpi: None, room, ..self.options(self.choices.dpi) };
         let art = art::open(&[path.to_path_buf()], &options, self.observer)
             .map_err(|source| FilterError::Layers { page: 1, source: source.calling_it("this document") })?;
-        let view = View {
-            window: Window { left: 0, top: 0, width: art.width, height: art.length },
-            position: match self.choices.place {
-                Place::At(corner) => Position::FromEdge(corner),
-                Place::Page | Place::Centre => Position::Centred,
-            },
-            beyond: None,
+        let position = match self.choices.place {
+            Place::At(corner) => Position::FromEdge(corner),
+            Place::Page | Place::Centre => Position::Centred,
         };
+        let layout = Layout { position, ..self.layout(self.choices.paper, self.choices.mirror) };
+        let placed = layout.placed((art.width, art.length));
+        let (_, beyond) = placed.map_err(|error| FilterError::Job { page: 1, source: error.into() })?;
+        let view = View { position, beyond };
         self.job(1, self.choices.paper, &art, &view, self.choices.mirror)
     }
 
@@ -170,13 +178,7 @@ impl Press<'_> {
         for suggestion in &composed.suggestions {
             self.observer.note(&format!("page {number}: {}", suggestion.text));
         }
-        let layout = Layout {
-            position: view.position,
-            mirror: mirrored,
-            cut: true,
-            profile: self.choices.profile,
-            ..Layout::centred(paper)
-        };
+        let layout = Layout { position: view.position, ..self.layout(paper, mirrored) };
         let handling = Handling { media: self.choices.media, curl_correction: self.choices.curl_correction };
         let request = Request {
             name: &art.name,
@@ -187,9 +189,7 @@ impl Press<'_> {
             library: self.library,
         };
         let job = pipeline::job(&request, self.observer).map_err(|error| unprintable(number, error))?;
-        // What a page has on its margins was left out before; what is moved there is cut off now.
-        let moved = !matches!(self.choices.place, Place::Page);
-        if let Some(cut) = view.beyond.or(job.draft.laid.cut.filter(|_| moved)) {
+        if let Some(cut) = view.beyond {
             self.observer
                 .note(&format!("page {number}: {cut} lies on the margins, where the printer cannot print"));
         }
@@ -221,68 +221,48 @@ pub(super) fn paper(
     })
 }
 
-/// What of a page is printed, and where.
+/// Where a page is printed.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct View {
-    /// The part of the page, in its pixels.
-    pub window: Window,
     position: Position,
-    /// What is left out on the margins.
+    /// What of its art is left out on the margins.
     beyond: Option<Cut>,
 }
 
 impl View {
-    /// `whole` asks for all that can be printed, also where nothing is drawn.
+    /// Where the whole page lies if what is drawn on it lies at its place. `layout` is of its paper.
     ///
     /// # Errors
-    /// How far everything lies beyond what can be printed.
+    /// A layout that does not hold; in it, how far everything lies beyond what can be printed.
     fn of(
         place: Place,
-        paper: Paper,
+        layout: &Layout,
         (size, dpi): ((usize, usize), u16),
         drawn: Window,
-        whole: bool,
-    ) -> Result<View, Cut> {
-        let pixels = |dots: u16| usize::from(dots) * usize::from(dpi) / 600;
-        let (across, down) = (pixels(paper.width()), pixels(paper.length()));
+    ) -> Result<Result<View, Cut>, LayoutError> {
+        let dots = |pixels: usize| pixels * 600 / usize::from(dpi);
+        let mm = |dots: usize| Mm::of_dots(dots as i64);
+        // A mirrored page is turned about its middle.
+        let left = match layout.mirror {
+            true => size.0.saturating_sub(drawn.left + drawn.width),
+            false => drawn.left,
+        };
+        let (left, top) = (dots(left), dots(drawn.top));
         let position = match place {
-            Place::Page => {
-                // A page that is a little smaller than its paper is paper there.
-                let (left, top) = (pixels(LEFT), pixels(paper.top()));
-                let (width, height) =
-                    (across.min(size.0.saturating_sub(left)), down.min(size.1.saturating_sub(top)));
-                let mm = |pixels: usize| pixels as f64 * 25.4 / f64::from(dpi);
-                let beyond = Cut {
-                    left: mm(left.saturating_sub(drawn.left)),
-                    top: mm(top.saturating_sub(drawn.top)),
-                    right: mm((drawn.left + drawn.width).saturating_sub(left + width)),
-                    bottom: mm((drawn.top + drawn.height).saturating_sub(top + height)),
-                };
-                let room = Window { left, top, width, height };
-                let Some(seen) = drawn.meet(&room) else { return Err(beyond) };
-                // What is bare costs as much time as what is drawn.
-                let window = if whole { room } else { seen };
-                let dots = |pixels: usize| Mm::of_dots((pixels * 600 / usize::from(dpi)) as i64);
-                return Ok(View {
-                    window,
-                    position: Position::FromPrintable(Point(
-                        dots(window.left - left),
-                        dots(window.top - top),
-                    )),
-                    beyond: (beyond != Cut::default()).then_some(beyond),
-                });
-            }
+            Place::Page => Position::FromEdge(Point(mm(left), mm(top))),
             Place::Centre => Position::Centred,
             Place::At(corner) => Position::FromEdge(corner),
         };
-        // No more than the sheet holds can be halftoned.
-        let window = Window { width: drawn.width.min(across), height: drawn.height.min(down), ..drawn };
-        let over = |found: usize, most: usize| (found - most) as f64 * 25.4 / f64::from(dpi);
-        let beyond = Cut {
-            right: over(drawn.width, window.width),
-            bottom: over(drawn.height, window.height),
-            ..Cut::default()
-        };
-        Ok(View { window, position, beyond: (beyond != Cut::default()).then_some(beyond) })
+        let (width, length) = (dots(drawn.width), dots(drawn.height));
+        let ((x, y), beyond) = Layout { position, ..layout.clone() }.placed((width, length))?;
+        let corner = Point(Mm::of_dots(x - left as i64), Mm::of_dots(y - top as i64));
+        Ok(match beyond {
+            Some(cut)
+                if cut.left.max(cut.right) >= mm(width).0 || cut.top.max(cut.bottom) >= mm(length).0 =>
+            {
+                Err(cut)
+            }
+            beyond => Ok(View { position: Position::FromPrintable(corner), beyond }),
+        })
     }
 }
