@@ -206,6 +206,38 @@ fn unknown_to_the_model(lighter: f64, haze: f64) {
     }
 }
 
+/// Ink on metal takes half as much again as the model knows, and of it one stack is measured: leaving that one out says how wrong the model
+/// is for its kind, and the bands of the others of the kind hold the truth. Inks on paper, which the model knows, keep a narrow band.
+#[test]
+fn the_band_of_a_kind_is_that_of_the_one_that_was_left_out() {
+    let inks = other_inks();
+    let metal = |ink: &Ink| matches!(ink.kind(), Kind::Metallic | Kind::Foil);
+    let truth = |stack: &Stack, t: f64| {
+        let light = inks.lobes(stack).unwrap().at(t);
+        if !stack.layers().iter().any(metal) {
+            return light;
+        }
+        let bare: Vec<Ink> =
+            stack.layers().iter().copied().filter(|ink| ink.kind() != Kind::Process).collect();
+        let bare = inks.lobes(&Stack::new(bare)).unwrap().at(t);
+        std::array::from_fn(|c| bare[c] * (light[c] / bare[c]).powf(1.5))
+    };
+    let measured = ["substrate", "C", "M", "Y", "K", "MS", "F", "MS+C", "C+M", "C+F", "MS+F"];
+    let found = library_of(&truth, &measured, 0.02).predict(|| {}).unwrap();
+    let judged = judged(&found, &truth);
+    let of = |name: &str| found.stacks.iter().position(|s| s.stack == name.parse().unwrap()).unwrap();
+    for name in ["MS+M", "MS+Y", "MS+K"] {
+        let (off, _, inside) = judged[of(name)];
+        assert!(off > 0.1 && inside > 0.9, "{name}: {off}, {inside}");
+    }
+    let band = |name: &str| {
+        let Predicted { curve, sigma, .. } = &found.stacks[of(name)];
+        curve.rgb().iter().zip(sigma).map(|(v, s)| s[1] / (v[1] + FLOOR)).sum::<f64>() / sigma.len() as f64
+    };
+    println!("bands: M+Y {:.3}, MS+M {:.3}", band("M+Y"), band("MS+M"));
+    assert!(band("M+Y") < 0.5 * band("MS+M"));
+}
+
 /// Leaving out: a stack whose ink no other has cannot be, and a wrong curve is found out by the others.
 #[test]
 fn a_wrong_measurement_has_the_largest_leave_one_out_error() {

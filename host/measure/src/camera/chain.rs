@@ -35,6 +35,8 @@ const CURVED_DRIFTS: f64 = 0.05;
 #[derive(Clone, Copy)]
 pub(crate) struct Link {
     pub(crate) shift: [f64; 2],
+    /// Its standard error, against the photograph in the middle of the series.
+    pub(crate) shift_error: [f64; 2],
     pub(crate) ratio: f64,
 }
 
@@ -52,7 +54,7 @@ pub(crate) fn links(
     let strange = |found: &Match| found.compared >= COMPARABLE && found.strange > STRANGE;
     let neighbours: Vec<Match> =
         (1..tones.len()).into_par_iter().map(|i| tones[i - 1].compare(&tones[i])).collect();
-    let mut chain = vec![Link { shift: [0.0; 2], ratio: 0.0 }];
+    let mut chain = vec![Link { shift: [0.0; 2], shift_error: [0.0; 2], ratio: 0.0 }];
     let mut alone = None;
     for (i, found) in (1..).zip(&neighbours) {
         let (name, path) = (exposures[i - 1].name(), &exposures[i].path);
@@ -139,9 +141,15 @@ pub(crate) fn links(
         // Still cameras stay still: a comparison's own error is no shift.
         let still = (0..2).all(|axis| found.shift[axis].abs() < SURE * found.shift_error[axis]);
         let shift = if still { [0.0; 2] } else { found.shift };
+        // Variances of neighbours add up, and what was no shift may have been one.
+        let error = |axis: usize| {
+            let own = if still { found.shift[axis] } else { 0.0 };
+            last.shift_error[axis].hypot(found.shift_error[axis].hypot(own))
+        };
         let ratio = if found.error < 0.01 { found.ratio } else { 0.0 };
         chain.push(Link {
             shift: [last.shift[0] + shift[0], last.shift[1] + shift[1]],
+            shift_error: [0, 1].map(error),
             ratio: last.ratio + ratio,
         });
     }
@@ -157,9 +165,11 @@ pub(crate) fn links(
         ));
     }
     // The photograph in the middle of the series is where the setup's positions hold.
-    let middle = chain[chain.len() / 2].shift;
+    let middle = chain[chain.len() / 2];
     for link in &mut chain {
-        link.shift = [link.shift[0] - middle[0], link.shift[1] - middle[1]];
+        link.shift = [0, 1].map(|axis| link.shift[axis] - middle.shift[axis]);
+        link.shift_error = [0, 1]
+            .map(|axis| (link.shift_error[axis].powi(2) - middle.shift_error[axis].powi(2)).abs().sqrt());
     }
     let along = |axis: usize| chain.iter().map(move |link| link.shift[axis]);
     for axis in 0..2 {

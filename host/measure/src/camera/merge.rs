@@ -38,6 +38,8 @@ pub struct Shot {
     pub ratio: f64,
     /// Shift against the series in pixels.
     pub shift: [f64; 2],
+    /// Its standard error, which grows with the steps to the photograph in the middle of the series.
+    pub shift_error: [f64; 2],
     /// Share of the pixels with a full channel.
     pub clipped: f64,
     /// The f-number, where the file says it.
@@ -193,6 +195,7 @@ pub fn merge(
             seconds: exposure.seconds,
             ratio: chain[i].ratio.exp(),
             shift: chain[i].shift,
+            shift_error: chain[i].shift_error,
             clipped,
             aperture: exposure.exif.aperture,
             iso: exposure.exif.iso,

@@ -185,7 +185,12 @@ impl<'a> Scenery<'a> {
         let (window, Looked { lighting, seen, .. }) = (&self.window, look);
         let cover = self.passes.cover(window, shot.blur, registration);
         let lights = cover.lights(window, lighting);
-        let steps = Steps { document: look.document.as_ref(), print: &look.predicted, photo: seen };
+        let steps = Steps {
+            document: look.document.as_ref(),
+            print: &look.predicted,
+            photo: seen,
+            placed: registration.is_some(),
+        };
         let Some((errors, stacks)) = figures::errors(&steps, &lights, window, look.scale.error) else {
             return Err(MeasureError::Scene(format!(
                 "{}: all of the print is clipped or outside the picture; expose shorter, or show all of it",

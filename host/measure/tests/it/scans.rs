@@ -355,7 +355,7 @@ fn sharpening_and_a_tone_curve_in_16_bits_are_named() {
         (0..plain.len()).into_par_iter().map(value).collect()
     };
     let said = |found: Result<ramp::Ramp, measure::MeasureError>| found.unwrap_err().to_string();
-    let words = said(measured(saved(&folder, "sharp.png", &(width, height, sharp(0.5)), 1.0), None));
+    let words = said(measured(saved(&folder, "sharp.png", &(width, height, sharp(1.5)), 1.0), None));
     println!("{words}");
     assert!(words.contains("sharpened") && words.contains("turn sharpening off"), "{words}");
     // 16 bits, proportional to light and not.
