@@ -383,6 +383,8 @@ impl Args {
             curl_correction: handling.curl_correction,
             colours: InkSet::of(settings.inks.iter().filter(|&ink| process.contains(ink))),
             spots: if layers.reserved { Spots::Reserved } else { Spots::Named },
+            inks_of: layers.colours()?,
+            tolerance: layers.tolerance,
             foils: settings.inks.iter().any(|ink| ink.kind() == protocol::ink::Kind::Foil),
             white: settings.white.unwrap_or(White::None),
             finish: settings.finish.unwrap_or(Finish::None),
