@@ -144,7 +144,7 @@ impl Own {
     }
 }
 
-/// Reads a list as [`write`] writes it.
+/// Reads a list as [`write()`] writes it.
 ///
 /// # Errors
 /// A message that says what is wrong, with the line or the name.
