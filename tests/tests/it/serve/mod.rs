@@ -72,16 +72,15 @@ fn job(seed: u64) -> Vec<u8> {
     bytes
 }
 
-/// One document through `layers`, through the filter of a print queue and through the server: the same bytes for the printer. Where
-/// colours are halftoned, `layers` begins its screen at the corner of the page, and the others where something is drawn.
+/// One document through `layers`, through the filter of a print queue and through the server: the same bytes for the printer.
 #[test]
 fn three_ways_to_print_a_document_make_the_same_job() {
     let bench = Bench::new();
     let options = "--paper 101.6x152.4mm --white under --media film";
     bench.done(&format!("preset save placed {options}"));
-    for (name, drawing, is_solid) in [
-        ("solid.pdf", "0 g 60 110 140 70 re f 0 1 1 rg 60 200 90 50 re f 1 1 0 rg 100 300 90 50 re f", true),
-        ("tones.pdf", "0 0.4 0.9 rg 60 110 140 70 re f 0.8 0.5 0.1 rg 90 120 40 200 re f", false),
+    for (name, drawing) in [
+        ("solid.pdf", "0 g 60 110 140 70 re f 0 1 1 rg 60 200 90 50 re f 1 1 0 rg 100 300 90 50 re f"),
+        ("tones.pdf", "0 0.4 0.9 rg 60 110 140 70 re f 0.8 0.5 0.1 rg 90 120 40 200 re f"),
     ] {
         // A page of whole dots, printed where it has its drawing.
         fs::write(bench.path(name), document((288, 432), "", &[drawing])).unwrap();
@@ -101,9 +100,7 @@ fn three_ways_to_print_a_document_make_the_same_job() {
         let [Ok(sheet)] = &kept[..] else { panic!("{} sheets", kept.len()) };
         let served = fs::read(sheet.path()).unwrap();
         assert!(served == filter.stdout, "{name}: the server's job differs from the queue's");
-        assert_eq!(served == layers, is_solid, "{name}: the server's job and that of layers");
-        let inks = |job: &[u8]| inspect(job, &Silent).passes.iter().map(|pass| pass.ink).collect::<Vec<_>>();
-        assert_eq!(inks(&served), inks(&layers));
+        assert!(served == layers, "{name}: the server's job differs from that of layers");
     }
 }
 
