@@ -2,8 +2,8 @@
 //!
 //! Problem: a program that was built for another system has been run by nobody.
 //! Method: the archive is unpacked as its users do and the program in it started, by itself, under `qemu` or under `wine`: a sample is printed, flat
-//! art too, a plan is made, a job goes to a bridge on a socket, each in a folder with a blank and a letter that is not ASCII in its name and, for
-//! Windows, more than 260 letters; where Ghostscript is not, a PDF has to say how it is had. What it has made comes back, to be compared.
+//! art too, a plan is made, a job goes to a bridge on a socket, in a folder with a blank and a letter that is not ASCII in its name; one result has a
+//! path of more than 260 letters; where Ghostscript is not, a PDF has to say how it is had. What it has made comes back, to be compared.
 //! Limits: no USB and no drivers, which an emulator of programs has not.
 
 use std::fs;
@@ -39,7 +39,7 @@ const ART: &str = r##"<svg xmlns="http://www.w3.org/2000/svg" width="30mm" heigh
 const PDF: &str = "%PDF-1.4\n1 0 obj<</Type/Catalog/Pages 2 0 R>>endobj\n2 0 obj<</Type/Pages/Kids[3 0 R]/Count 1>>endobj\n\
     3 0 obj<</Type/Page/Parent 2 0 R/MediaBox[0 0 200 200]>>endobj\ntrailer<</Root 1 0 R>>\n";
 
-/// Windows' old limit of a path.
+/// Windows' old limit of a path; that of the folder in which a program starts still holds.
 const LONG: usize = 260;
 
 /// Unpacks the archive in this folder, which is emptied, and uses its program; `bridge` serves a bridge on a socket. Gives two jobs and
@@ -48,12 +48,9 @@ pub fn run(system: &System, archive: &Path, folder: &Path, bridge: &Path) -> Res
     let _ = fs::remove_dir_all(folder);
     fs::create_dir_all(folder)?;
     let program = unpack(system, archive, folder)?;
-    let mut work = folder.join("my prints é");
+    let work = folder.join("my prints é");
     if system.form == Form::Zip {
         random_numbers_for_wine(&program, folder)?;
-        while work.as_os_str().len() < LONG {
-            work.push("a folder in a folder");
-        }
     }
     fs::create_dir_all(&work)?;
     let start = |arguments: &[&str]| {
@@ -79,13 +76,16 @@ pub fn run(system: &System, archive: &Path, folder: &Path, bridge: &Path) -> Res
     };
     let version = run(&["--version"])?;
     ensure!(version.starts_with(b"foilpress "), "it said {}", String::from_utf8_lossy(&version));
-    run(&["print", "sample:leaf", "--size", "20mm", "--to", "file:leaf.rgl", "-o", "leaf é"])?;
+    let above = format!("leaf é{}", "/a folder in a folder".repeat(LONG / 20));
+    fs::create_dir_all(work.join(&above))?;
+    let deep = format!("{above}/é");
+    run(&["print", "sample:leaf", "--size", "20mm", "--to", "file:leaf.rgl", "-o", &deep])?;
     fs::write(work.join("art.svg"), ART)?;
     run(&["layers", "art.svg", "--to", "file:layers.rgl"])?;
     let plan = run(&["plan", "layers.rgl", "--json"])?;
     let read =
         |name: &str| fs::read(work.join(name)).with_context(|| format!("{} has made no {name}", system.name));
-    ensure!(read("leaf é/job.rgl")? == read("leaf.rgl")?, "the job in the folder is another");
+    ensure!(read(&format!("{deep}/job.rgl"))? == read("leaf.rgl")?, "the job in the folder is another");
     if system.form == Form::Zip {
         fs::write(work.join("page.pdf"), PDF)?;
         let said = start(&["layers", "page.pdf", "--to", "file:page.rgl"])?;
