@@ -113,3 +113,12 @@ fn command(program: &str, args: &[&str]) -> Command {
     command.args(args);
     command
 }
+
+/// The files in this folder and below.
+fn all_files(folder: &Path, files: &mut Vec<std::path::PathBuf>) -> anyhow::Result<()> {
+    for item in std::fs::read_dir(folder)? {
+        let path = item?.path();
+        if path.is_dir() { all_files(&path, files)? } else { files.push(path) }
+    }
+    Ok(())
+}

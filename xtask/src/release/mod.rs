@@ -18,7 +18,7 @@ use std::{env, fs};
 use anyhow::{Context as _, Result, ensure};
 
 use crate::package::{self, Profile};
-use crate::{cargo, command, firmware, succeed};
+use crate::{all_files, cargo, command, firmware, succeed};
 
 mod trial;
 
@@ -368,12 +368,4 @@ fn rust_linkers() -> Result<PathBuf> {
         PathBuf::from(said("sysroot")?).join("lib/rustlib").join(said("host-tuple")?).join("bin/gcc-ld");
     ensure!(folder.join("ld.lld").is_file(), "{} holds no linker", folder.display());
     Ok(folder)
-}
-
-fn all_files(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
-    for item in fs::read_dir(folder)? {
-        let path = item?.path();
-        if path.is_dir() { all_files(&path, files)? } else { files.push(path) }
-    }
-    Ok(())
 }
