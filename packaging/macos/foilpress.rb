@@ -10,7 +10,7 @@ class Foilpress < Formula
   depends_on "ghostscript"
 
   def install
-    system "cargo", "install", "--locked", "--path", "host", "--features", "serve", "--root", prefix
+    system "cargo", "install", "--locked", "--path", "host", "--all-features", "--root", prefix
     generate = buildpath/"tree"
     system bin/"foilpress", "generate", generate
     man1.install Dir[generate/"usr/share/man/man1/*"]

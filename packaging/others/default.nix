@@ -5,7 +5,7 @@ pkgs.rustPlatform.buildRustPackage {
   version = "0.1.0";
   src = ../..;
   cargoLock.lockFile = ../../Cargo.lock;
-  cargoBuildFlags = [ "--package" "foilpress" "--features" "serve" ];
+  cargoBuildFlags = [ "--package" "foilpress" "--all-features" ];
   doCheck = false; # `cargo xtask test` is the test
   postInstall = "install -Dm644 packaging/70-foilpress.rules $out/lib/udev/rules.d/70-foilpress.rules";
 }

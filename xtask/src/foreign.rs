@@ -17,7 +17,7 @@ const SYSTEMS: [&str; 2] = ["aarch64-apple-darwin", "x86_64-pc-windows-gnu"];
 /// Lints the program for each.
 pub fn lint(root: &Path) -> Result<()> {
     succeed(command("rustup", &["target", "add"]).args(SYSTEMS))?;
-    let mut lint = cargo(&["clippy", "--package", "foilpress", "--features", "serve", "--locked"]);
+    let mut lint = cargo(&["clippy", "--package", "foilpress", "--all-features", "--locked"]);
     let script = root.join("xtask/no-compiler.sh");
     for system in SYSTEMS {
         lint.args(["--target", system]);

@@ -32,8 +32,8 @@ pub fn build(root: &Path, profile: Profile) -> Result<()> {
     };
     // The tests' build has the libraries already, with the features of the whole workspace.
     let which: &[&str] = match profile {
-        Profile::Release => &["--package", "foilpress", "--features", "serve"],
-        Profile::Dev => &["--workspace", "--bin", "foilpress", "--features", "foilpress/serve"],
+        Profile::Release => &["--package", "foilpress", "--all-features"],
+        Profile::Dev => &["--workspace", "--bin", "foilpress", "--features", "foilpress/log,foilpress/serve"],
     };
     succeed(cargo(&[&["build", "--locked", "--profile", name], which].concat()).current_dir(root))?;
     pack(root, &built, profile)

@@ -32,8 +32,7 @@ pub fn path() -> &'static Path {
             "foilpress",
             "--bin",
             "foilpress",
-            "--features",
-            "serve",
+            "--all-features",
         ]);
         if folder.ends_with("release") {
             build.arg("--release");

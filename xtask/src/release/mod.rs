@@ -222,7 +222,7 @@ impl Release<'_> {
 
     /// The optimised program.
     fn program(&self, system: &System) -> Result<PathBuf> {
-        let folder = self.build(system, &["--package", "foilpress", "--features", "serve"])?;
+        let folder = self.build(system, &["--package", "foilpress", "--all-features"])?;
         Ok(folder.join(system.program()))
     }
 

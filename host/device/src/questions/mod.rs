@@ -4,6 +4,7 @@
 //! the firmware's log, and [`wiring`] names the fault behind what a loop-back plug shows.
 
 pub mod cartridges;
+#[cfg(feature = "log")]
 pub mod log;
 pub mod query;
 pub mod status;
