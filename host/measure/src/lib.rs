@@ -30,4 +30,4 @@ pub mod scans;
 pub mod setup;
 
 pub use error::MeasureError;
-pub use measurement::{Measurement, Taken, measure};
+pub use measurement::{Check, Measurement, Taken, check, measure};

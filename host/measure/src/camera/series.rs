@@ -10,8 +10,11 @@ use super::photo;
 use crate::MeasureError;
 use crate::setup::Setup;
 
-/// Photographs with their exposure times, for each lamp of the setup.
-pub(crate) fn series(folder: &Path, setup: &Setup) -> Result<Vec<Vec<Exposure>>, MeasureError> {
+/// Photographs with their exposure times, for each lamp of the setup, and what is not in the folder.
+pub(crate) fn series(
+    folder: &Path,
+    setup: &Setup,
+) -> Result<(Vec<Vec<Exposure>>, Vec<MeasureError>), MeasureError> {
     let mut series: Vec<Vec<Exposure>> = vec![Vec::new(); setup.light.len()];
     let mut named: Vec<&String> = setup.exposures.keys().collect();
     // Photographs that the setup file names are no exposures, wherever they lie.
@@ -40,20 +43,21 @@ pub(crate) fn series(folder: &Path, setup: &Setup) -> Result<Vec<Vec<Exposure>>,
         named.retain(|other| **other != name);
         series[light].push(exposure(path, &name, setup)?);
     }
+    let mut missing = Vec::new();
     if let Some(name) = named.first() {
-        return Err(MeasureError::Scene(format!(
+        missing.push(MeasureError::Scene(format!(
             "setup file: exposures names {name}, which is not in {}; correct the name",
             folder.display()
         )));
     }
-    match series.iter().position(Vec::is_empty) {
-        Some(empty) => Err(MeasureError::Scene(format!(
+    for empty in (0..series.len()).filter(|&light| series[light].is_empty()) {
+        missing.push(MeasureError::Scene(format!(
             "light {}: no photograph's name begins with `{}`; photograph it, or take it out of the setup file",
             empty + 1,
             setup.light[empty].photos
-        ))),
-        None => Ok(series),
+        )));
     }
+    Ok((series, missing))
 }
 
 /// A photograph with its exposure time.

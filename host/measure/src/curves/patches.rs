@@ -60,7 +60,7 @@ impl OnSheet {
     }
 }
 
-/// Solid rectangles of a sheet's dots with their stacks, bare paper left out.
+/// Solid rectangles of a sheet's dots with their stacks; of bare paper only those that ink encloses.
 fn solid(sheet: &DotMap) -> Vec<(Stack, Area)> {
     let (width, length) = (sheet.width(), sheet.length());
     let least = (LEAST * DOTS_PER_MM) as usize;
@@ -73,10 +73,20 @@ fn solid(sheet: &DotMap) -> Vec<(Stack, Area)> {
             let wide = (x..width).take_while(|&x| at(x, y) == own).count();
             let starts = y == 0 || at(x, y - 1) != own;
             let stack = &sheet.stacks()[usize::from(own)];
-            if wide >= least && starts && !stack.layers().is_empty() {
+            if wide >= least && starts {
                 let row = |y: usize| sheet.index()[y * width + x..][..wide].iter().all(|dot| *dot == own);
                 let long = (y..length).take_while(|&y| row(y)).count();
-                if long >= least {
+                let is_inked =
+                    |x: usize, y: usize| !sheet.stacks()[usize::from(at(x, y))].layers().is_empty();
+                let is_framed = || {
+                    x > 0
+                        && y > 0
+                        && x + wide < width
+                        && y + long < length
+                        && (x..x + wide).all(|x| is_inked(x, y - 1) && is_inked(x, y + long))
+                        && (y..y + long).all(|y| is_inked(x - 1, y) && is_inked(x + wide, y))
+                };
+                if long >= least && (!stack.layers().is_empty() || is_framed()) {
                     found.push((stack.clone(), Area { left: x, top: y, width: wide, length: long }));
                 }
             }
@@ -220,16 +230,25 @@ mod tests {
 
     #[test]
     fn patches_of_a_chart_are_its_stacks_and_not_its_letters() {
-        for strips in [false, true] {
+        for can in [None, Some("50".parse().unwrap()), Some("37x110".parse().unwrap())] {
             let stacks: Vec<Stack> = ["substrate", "K", "MS", "MS+C"].map(|s| s.parse().unwrap()).to_vec();
-            let dots = chart::stacks(&stacks, Paper::A4, strips).unwrap();
+            let dots = chart::stacks(&stacks, Paper::A4, can).unwrap();
             let layout = Layout { camera_marks: true, ..Layout::centred(Paper::A4) };
             let sheet = arrange(&dots, &layout, &Silent).unwrap().sheet;
             let chart = ChartOnSample::new(sheet.dots()).unwrap();
-            assert_eq!(chart.stacks(), stacks[1..]);
-            let wide = if strips { 90.0 } else { 20.0 };
-            for (_, area) in &chart.patches {
-                assert!((area.width as f64 / DOTS_PER_MM - wide).abs() < 0.1, "{area:?}");
+            // Bare paper is the last, within its frame.
+            let found: Vec<Stack> = chart.stacks();
+            assert_eq!((&found[..3], &found[3..]), (&stacks[1..], &stacks[..1]));
+            let wide = can.map_or(20.0, |can: chart::Can| 1.8 * can.radius);
+            for (stack, area) in &chart.patches {
+                let frame = if stack.layers().is_empty() { 20.0 / DOTS_PER_MM } else { 0.0 };
+                assert!((area.width as f64 / DOTS_PER_MM + frame - wide).abs() < 0.1, "{area:?}");
+            }
+            // Marks above and below are part of the print.
+            if let Some(height) = can.and_then(|can| can.height) {
+                assert!(sheet.dots().length() as f64 / DOTS_PER_MM < 297.0);
+                let marks = 2.0 * (press::layout::camera::SIDE + press::layout::camera::QUIET) as f64;
+                assert!((dots.length() as f64 + marks) / DOTS_PER_MM <= height);
             }
         }
     }

@@ -153,7 +153,7 @@ fn a_library_measured_from_a_can_prints_as_well_as_the_true_one() {
     CAMERA.photograph(&photos, "exp_", |d| light(sheet.dots(), &curves, d));
     // Another chart is not what is in the pictures.
     let stacks: Vec<Stack> = ["C", "MS"].map(stack).to_vec();
-    let dots = press::chart::stacks(&stacks, Paper::A4, true).unwrap();
+    let dots = press::chart::stacks(&stacks, Paper::A4, Some("50".parse().unwrap())).unwrap();
     let layout = Layout { camera_marks: true, ..Layout::centred(Paper::A4) };
     let other = arrange(&dots, &layout, &Silent).unwrap().sheet;
     let said = measure(&photos, &setup(), Some(other.dots()), &Silent).err().unwrap().to_string();

@@ -320,6 +320,35 @@ fn mistakes_are_named() {
         rectangle_px: [180.0, 100.0, 210.0, 260.0],
     }];
     fails(&rendered.photos(), &aside, ["stack K: no highlight in view", "move the lamp"]);
+    // Beside a stack that has one it is left out.
+    let all = measure::setup::Patch {
+        stack: material.stack.parse().unwrap(),
+        rectangle_px: [180.0, 100.0, 300.0, 260.0],
+    };
+    aside.patch.push(all);
+    let taken = measure(&rendered.photos(), &aside, None, &Silent).unwrap().measurement;
+    assert_eq!(taken.stacks.iter().map(|s| &*s.stack).collect::<Vec<_>>(), [material.stack]);
+    assert!(taken.again.iter().any(|line| line.starts_with("left out: stack K: no highlight")), "{taken:?}");
+
+    // A check tells the same of the first photograph alone, and all of it at once.
+    let alone = tempfile::tempdir().unwrap();
+    std::fs::copy(rendered.photos().join("exp_3.png"), alone.path().join("exp_3.png")).unwrap();
+    let mut first = aside.clone();
+    first.exposures.retain(|name, _| name == "exp_3.png");
+    let checked = measure::check(alone.path(), &first, None, &Silent).unwrap();
+    let says = |lines: &[String], words: &str| lines.iter().any(|line| line.contains(words));
+    assert!(
+        says(&checked.good, "one photograph") && says(&checked.good, "grey card is found"),
+        "{checked:?}"
+    );
+    assert!(says(&checked.good, &format!("with their highlight: {}", material.stack)), "{checked:?}");
+    assert!(says(&checked.mend, "stack K: no highlight") && says(&checked.mend, "lamp off"), "{checked:?}");
+    first.patch.remove(0);
+    let checked = measure::check(alone.path(), &first, None, &Silent).unwrap();
+    assert!(says(&checked.good, "tape fit") && says(&checked.mend, "one exposure only"), "{checked:?}");
+    let wrong = Setup { patch: first.patch, ..setup(&Tape { radius: 44.0, ..EXACT }, "K", &first.exposures) };
+    let checked = measure::check(alone.path(), &wrong, None, &Silent).unwrap();
+    assert!(says(&checked.mend, "sample.radius_mm: the setup file says"), "{checked:?}");
 
     // Photographs changed one by one.
     let changed = |change: &dyn Fn(usize, &mut Picture)| {

@@ -421,7 +421,7 @@ fn what_no_ramp_can_be_read_from_is_named() {
     let other = laid(&DotMap::new(dots.width(), dots.length(), stacks, index).unwrap());
     refused(path.clone(), &other, &["good.png", "another sheet"]);
     // A sheet that is no ramp.
-    let stacks = chart::stacks(&[stack("K"), stack("MS")], Paper::A4, false).unwrap();
+    let stacks = chart::stacks(&[stack("K"), stack("MS")], Paper::A4, None).unwrap();
     let layout = Layout { camera_marks: true, ..Layout::centred(Paper::A4) };
     refused(
         path,

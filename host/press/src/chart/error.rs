@@ -31,6 +31,16 @@ pub enum ChartError {
         /// How many there can be.
         most: usize,
     },
+    /// More stacks than go round a can.
+    #[error(
+        "{found} stacks, but a can of this height has room for {most}; choose fewer inks, or glue two such cans on each other"
+    )]
+    Can {
+        /// How many.
+        found: usize,
+        /// How many there can be.
+        most: usize,
+    },
     /// The paper is too small.
     #[error(
         "the {chart} chart needs a printable area of {width:.0} x {length:.0} mm, and {paper} has less; choose a4 or letter"

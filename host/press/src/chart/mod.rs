@@ -22,7 +22,7 @@ pub use methods::{halftones, size_of_halftones};
 pub use ramp::ramp;
 pub use registration::registration;
 pub use room::check_room;
-pub use steps::{ladder, size_of_ladder, stacks};
+pub use steps::{Can, ladder, size_of_ladder, stacks};
 
 #[cfg(test)]
 mod tests;

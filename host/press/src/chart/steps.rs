@@ -1,5 +1,7 @@
 //! Inks side by side: the paper's figures 2 and 5, and every stack as a patch to measure.
 
+use std::str::FromStr;
+
 use inks::{Library, Stack};
 use protocol::ink::{Ink, Kind};
 use protocol::paper::Paper;
@@ -95,24 +97,69 @@ pub fn ladder(
     Ok(sketch.finish()?)
 }
 
-/// Sides of a patch in millimetres, and of a strip that goes round a can: across it sees all half angles.
-const SQUARE: (f64, f64) = (20.0, 20.0);
-const BAND: (f64, f64) = (90.0, 12.0);
+/// Side of a patch in millimetres.
+const SQUARE: f64 = 20.0;
+/// Height of a strip in millimetres: where a can has room for it, and the least that can be measured, its edges left out.
+const STRIP: [f64; 2] = [12.0, 7.0];
+/// Width of a strip in radii of the can: to its sides 52 degrees from the middle, so that a camera sees it whole, and the marks beside it.
+const AROUND: f64 = 1.8;
+/// Lines around a patch of bare paper, in dots: four tenths of a millimetre.
+const FRAME: usize = 10;
+
+/// A can that a chart goes round: `33x95`, its radius and the height of its straight part in millimetres; `33` alone for any height.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Can {
+    /// Radius in mm, 20 to 110.
+    pub radius: f64,
+    /// Height in mm.
+    pub height: Option<f64>,
+}
+
+impl FromStr for Can {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Can, String> {
+        let (radius, height) = text.split_once('x').map_or((text, None), |(r, h)| (r, Some(h)));
+        let number = |text: &str| text.parse::<f64>().ok().filter(|mm| mm.is_finite() && *mm > 0.0);
+        let can = number(radius)
+            .filter(|radius| (20.0..=110.0).contains(radius))
+            .zip(height.map_or(Some(None), |height| number(height).map(Some)));
+        let (radius, height) = can.ok_or(
+            "a can is its radius (20 to 110) and the height of its straight part in millimetres, such as 33x95, or its radius alone",
+        )?;
+        Ok(Can { radius, height })
+    }
+}
 
 /// Every stack that these inks can make, a solid patch each, labelled, for a gloss meter or a camera; or a strip each, one below the
-/// other, to wrap round a can. Camera marks have room above and below.
+/// other, to wrap round a can. Bare paper, if it is among them, is the last, in a frame. Camera marks have room above and below.
 ///
-/// Errors: more than the paper has room for.
-pub fn stacks(stacks: &[Stack], paper: Paper, strips: bool) -> Result<DotMap, ChartError> {
-    let (width, length) =
-        (usize::from(paper.width()), usize::from(paper.length()).saturating_sub(2 * (SIDE + QUIET)));
-    let (wide, long) = if strips { BAND } else { SQUARE };
-    let (patch, gap) = ((mm(wide), mm(long)), mm(4.0));
-    let cell = (patch.0 + gap, patch.1 + mm(1.0) + LINE * 3 + mm(3.0));
-    let columns = if strips { 1 } else { ((width + gap) / cell.0).max(1) };
+/// Errors: more than the paper or the can has room for.
+pub fn stacks(stacks: &[Stack], paper: Paper, can: Option<Can>) -> Result<DotMap, ChartError> {
+    let marks = 2 * (SIDE + QUIET);
+    let (width, length) = (usize::from(paper.width()), usize::from(paper.length()).saturating_sub(marks));
+    let (mut shown, bare): (Vec<&Stack>, Vec<&Stack>) =
+        stacks.iter().partition(|stack| !stack.layers().is_empty());
+    shown.extend(bare.first());
+    let gap = mm(4.0);
+    let label = mm(1.0) + LINE * 3 + mm(3.0);
+    let patch = match can {
+        None => (mm(SQUARE), mm(SQUARE)),
+        Some(can) => {
+            let height = can.height.map_or(usize::MAX, |height| mm(height).saturating_sub(marks));
+            let [most, least] = STRIP.map(mm);
+            let long = (height / shown.len().max(1)).saturating_sub(label).min(most);
+            if long < least {
+                let most = height / (least + label);
+                return Err(ChartError::Can { found: shown.len(), most });
+            }
+            (mm(AROUND * can.radius), long)
+        }
+    };
+    let cell = (patch.0 + gap, patch.1 + label);
+    let columns = if can.is_some() { 1 } else { ((width + gap) / cell.0).max(1) };
     let most = columns * (length / cell.1);
-    let shown: Vec<&Stack> = stacks.iter().filter(|stack| !stack.layers().is_empty()).collect();
-    if shown.is_empty() || shown.len() > most {
+    if shown.iter().all(|stack| stack.layers().is_empty()) || shown.len() > most {
         return Err(ChartError::TooMany { what: "stacks", found: shown.len(), most });
     }
     let columns = columns.min(shown.len());
@@ -120,7 +167,12 @@ pub fn stacks(stacks: &[Stack], paper: Paper, strips: bool) -> Result<DotMap, Ch
     let mut sketch = Sketch::new(columns * cell.0 - gap, shown.len().div_ceil(columns) * cell.1);
     for (i, stack) in shown.into_iter().enumerate() {
         let (x, y) = (i % columns * cell.0, i / columns * cell.1);
-        sketch.fill((x, y, patch.0, patch.1), stack);
+        if stack.layers().is_empty() {
+            sketch.fill((x, y, patch.0, patch.1), &pen);
+            sketch.fill((x + FRAME, y + FRAME, patch.0 - 2 * FRAME, patch.1 - 2 * FRAME), stack);
+        } else {
+            sketch.fill((x, y, patch.0, patch.1), stack);
+        }
         let label = stack.to_string();
         // As large as the patch has room for.
         let scale = (patch.0 / (label.len() * LETTER)).clamp(1, 3);

@@ -115,7 +115,7 @@ fn a_ladder_keeps_four_levels_apart_where_clamping_keeps_two() {
 #[test]
 fn every_stack_has_a_patch_of_its_own_that_is_solid() {
     let all: Vec<Stack> = ["substrate", "C", "K", "MS", "MS+C", "MS+C+F"].map(stack).to_vec();
-    let chart = stacks(&all, Paper::A4, false).unwrap();
+    let chart = stacks(&all, Paper::A4, None).unwrap();
     for wanted in &all[1..] {
         let number = chart.stacks().iter().position(|s| s == wanted).unwrap() as u8;
         let dots = chart.index().iter().filter(|&&dot| dot == number).count();
@@ -126,7 +126,16 @@ fn every_stack_has_a_patch_of_its_own_that_is_solid() {
         );
     }
     let many: Vec<Stack> = (1..200).map(|n| Stack::new(vec![Ink::White; n])).collect();
-    assert!(stacks(&many, Paper::A4, false).unwrap_err().to_string().contains("choose fewer inks"));
+    assert!(stacks(&many, Paper::A4, None).unwrap_err().to_string().contains("choose fewer inks"));
+    // Six strips go round a food can, and seven do not.
+    let can = Some("37x110".parse::<Can>().unwrap());
+    let chart = stacks(&many[1..7], Paper::A4, can).unwrap();
+    assert_eq!(chart.width(), (1.8 * 37.0 * 600.0 / 25.4_f64).round() as usize);
+    let said = stacks(&many[1..8], Paper::A4, can).unwrap_err().to_string();
+    assert!(said.contains("7 stacks") && said.contains("room for 6"), "{said}");
+    for wrong in ["", "x", "33x", "19", "nan", "33x-5", "inf"] {
+        assert!(wrong.parse::<Can>().is_err(), "{wrong}");
+    }
 }
 
 #[test]

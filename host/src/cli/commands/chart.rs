@@ -31,7 +31,8 @@ use sheet::DotMap;
     foilpress chart ladder C+M+Y+F C+M+Y\n  \
     foilpress chart halftone                             (black on paper by each halftone)\n  \
     foilpress chart stacks --inks process,MS,F           (a labelled patch of each stack, to measure)\n  \
-    foilpress chart stacks --inks MS,C,F --strips        (strips to wrap round a can)\n  \
+    foilpress chart stacks --inks MS,C,F --strips        (strips to wrap round a can of 50 mm radius)\n  \
+    foilpress chart stacks --inks K,F --strips 33x95     (round a drink can)\n  \
     foilpress chart registration --inks black,cyan,white\n  \
     foilpress chart calibration --to serial:/dev/ttyACM0")]
 pub struct Args {
@@ -133,9 +134,9 @@ struct Halftone {
 struct Stacks {
     #[command(flatten)]
     inks: InkArgs,
-    /// Print strips of 90 x 12 mm, one below the other, to wrap round a can
-    #[arg(long)]
-    strips: bool,
+    /// Print strips, one below the other, to wrap round a can: its radius, or radius and height in mm, such as 33x95
+    #[arg(long, value_name = "CAN", num_args = 0..=1, default_missing_value = "50")]
+    strips: Option<chart::Can>,
     #[command(flatten)]
     job: JobArgs,
 }

@@ -25,6 +25,7 @@ use sheet::Sheet;
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
     after_help = "Examples:\n  \
+    foilpress measure photos/ --setup can.toml --check   (what to mend, after the first photographs)\n  \
     foilpress measure photos/ --setup can.toml -o mine/\n  \
     foilpress measure report mine/                       (one page with every curve)\n  \
     foilpress measure ramp k.png --chart k.rgl --by \"A. Owner\" --when 2026-11-02 -o mine/\n  \
@@ -42,8 +43,11 @@ pub struct Args {
     #[arg(long, value_name = "FILE.toml", required = true)]
     setup: Option<PathBuf>,
     /// Folder to write: an ink library with the measured curves, measurement.json and pictures
-    #[arg(short, long, value_name = "DIR", required = true)]
+    #[arg(short, long, value_name = "DIR", required_unless_present = "check")]
     output: Option<PathBuf>,
+    /// Only say what to mend before more photographs are taken; one photograph is enough, and nothing is written
+    #[arg(long, conflicts_with = "output")]
+    check: bool,
 }
 
 #[derive(Subcommand, Debug)]
@@ -70,7 +74,8 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         (Some(What::Registration(args)), ..) => registration::run(args, observer),
         (Some(What::Report { dir, output }), ..) => report(dir, output.as_deref()),
         (None, Some(photos), Some(setup), Some(output)) => curves(photos, setup, output, observer),
-        // The parser asks for all three.
+        (None, Some(photos), Some(setup), None) => check(photos, setup, observer),
+        // The parser asks for them.
         _ => Ok(()),
     }
 }
@@ -91,6 +96,25 @@ fn curves(photos: &Path, setup: &Path, output: &Path, observer: &dyn Observer) -
     Library::from_dir(folder).context("the measured curves cannot be used as an ink library")?;
     staged.commit()?;
     show(&summary(&taken.measurement, output))
+}
+
+/// Says what is right and what to mend.
+fn check(photos: &Path, setup: &Path, observer: &dyn Observer) -> Result<()> {
+    let setup = Setup::read(setup)?;
+    let sheet = setup.sample.chart.as_deref().map(|path| chart(path, observer)).transpose()?;
+    let found = measure::check(photos, &setup, sheet.as_ref().map(Sheet::dots), observer)?;
+    let mut text = String::new();
+    for (word, lines) in [("good", &found.good), ("mend", &found.mend)] {
+        for line in lines {
+            let _ = writeln!(text, "{word}  {line}");
+        }
+    }
+    show(&text)?;
+    match found.mend.len() {
+        0 => Ok(()),
+        1 => bail!("one thing to mend before the series is taken"),
+        n => bail!("{n} things to mend before the series is taken"),
+    }
 }
 
 fn report(dir: &Path, output: Option<&Path>) -> Result<()> {

@@ -55,7 +55,7 @@ pub fn truth(stack: &str, theta: f64) -> V {
 /// A chart of strips with camera marks.
 pub fn chart() -> Sheet {
     let stacks: Vec<Stack> = STACKS.map(stack).to_vec();
-    let dots = chart::stacks(&stacks, Paper::A4, true).unwrap();
+    let dots = chart::stacks(&stacks, Paper::A4, Some("50".parse().unwrap())).unwrap();
     let paper = Paper::Custom { width: dots.width() as u16 + 100, length: dots.length() as u16 + 650 };
     let layout = Layout { camera_marks: true, ..Layout::centred(paper) };
     arrange(&dots, &layout, &Silent).unwrap().sheet

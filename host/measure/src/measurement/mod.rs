@@ -3,31 +3,31 @@
 //! Series are merged one after the other, and only the pixels that curves need are kept of each, so that memory does not grow with
 //! the number of lamps. Each step judges what it made: what nobody should trust is an error, what may be better is advice.
 
+mod advice;
+mod check;
+mod look;
+
 use std::path::Path;
 
 use image::RgbImage;
-use inks::Stack;
 use observe::Observer;
 use serde::{Deserialize, Serialize};
 use sheet::DotMap;
 
-use crate::camera::frames::Frames;
-use crate::camera::merge::{self, Shot};
-use crate::camera::residual_shift::ResidualShifts;
-use crate::camera::series;
-use crate::curves::blur;
-use crate::curves::card::{self, Calibration};
-use crate::curves::coverage;
-use crate::curves::patches::{ChartOnSample, Region};
-use crate::curves::pictures::Copy;
+use crate::MeasureError;
+use crate::camera::merge::Shot;
+use crate::curves::card::Calibration;
+use crate::curves::extent;
 use crate::curves::reduce::{self, CurveRow, Doubts, Pixel, Reduced};
-use crate::curves::{extent, gather};
 use crate::geometry::correction::{self, GeometrySample};
 use crate::geometry::measures::{self, Corrected};
 use crate::geometry::scene::Scene;
-use crate::geometry::shadow::{self, Shadow};
+use crate::geometry::shadow::Shadow;
 use crate::setup::{Setup, Trust};
-use crate::{MeasureError, linalg};
+
+use look::{Looked, SeriesRecord};
+
+pub use check::{Check, check};
 
 /// Pixels that correct the geometry.
 const SOLVING: usize = 6000;
@@ -38,10 +38,6 @@ const SHARPENED: usize = 2;
 const SOFT: f64 = 0.01;
 /// One of so many pixels is enough for that.
 const THINNED: usize = 3;
-/// A blur in pixels that is worth a word: below it a foil's peak keeps its height within the band.
-const OUT_OF_FOCUS: f64 = 0.8;
-/// A share of other light that is worth a word.
-const FOREIGN: f64 = 0.03;
 /// A deviation of a card's step that noise and paper explain.
 const CARD_AGREES: f64 = 0.01;
 
@@ -111,16 +107,8 @@ pub struct Taken {
     pub pictures: Vec<(String, RgbImage)>,
 }
 
-/// What is kept of a series.
-struct SeriesRecord {
-    series: PhotoSeries,
-    copy: Copy,
-    outline: Vec<[f64; 2]>,
-    /// For each stack.
-    pixels: Vec<Vec<Pixel>>,
-}
-
-/// Measures the photographs of a folder. `chart` is the sheet of the chart that lies on the sample, if the setup names one.
+/// Measures the photographs of a folder. `chart` is the sheet of the chart that lies on the sample, if the setup names one. A stack that
+/// cannot be measured is left out with a word, as long as there are others.
 ///
 /// # Errors
 /// Photographs, setup or scene that give no trustworthy curves; each says what is wrong and what to do.
@@ -130,74 +118,21 @@ pub fn measure(
     chart: Option<&DotMap>,
     observer: &dyn Observer,
 ) -> Result<Taken, MeasureError> {
-    let series = series::series(folder, setup)?;
-    let chart = chart.map(ChartOnSample::new).transpose()?;
-    let stacks = match &chart {
-        Some(chart) => chart.stacks(),
-        None => {
-            setup.sample.stack.iter().chain(setup.patch.iter().map(|patch| &patch.stack)).cloned().collect()
-        }
-    };
-    let frames = Frames::read(setup.photos.flat_field.as_deref(), setup.photos.dark_frame.as_deref())?;
-    let off = series::lamp_off(setup)?;
-    observer.begin("reading photographs", 2 * series.iter().map(Vec::len).sum::<usize>() as u64);
-    let mut scene: Option<((usize, usize), Scene)> = None;
-    let mut seen = Vec::new();
-    for (light, exposures) in series.into_iter().enumerate() {
-        let film = exposures.iter().find_map(|e| e.exif.film_focal_mm);
-        let first = exposures[0].path.clone();
-        let (radiance, shots) =
-            merge::merge(exposures, &frames, off.as_ref(), setup.photos.linear, observer)?;
-        let size = (radiance.width, radiance.height);
-        if scene.is_none() {
-            scene = Some((size, Scene::new(setup, size, setup.field_of_view(film, size)?)?));
-        }
-        let Some((expected, scene)) = &scene else { continue };
-        if *expected != size {
-            let problem = format!(
-                "{} x {} pixels, but another lamp's have {} x {}",
-                size.0, size.1, expected.0, expected.1
-            );
-            return Err(MeasureError::photo(&first, problem));
-        }
-        let steps = match setup.card.rectangle_px {
-            Some(rectangle) => card::steps_of(rectangle, &radiance),
-            None => card::find(&radiance, setup.card.reflectance)?,
-        };
-        let card = card::calibrate(&radiance, steps, &setup.card, scene, light)?;
-        let blur = blur::of_card(&radiance, &card.steps);
-        let scene = &scene.clone().with_blur(blur);
-        let shadow = scene.radius().and_then(|_| shadow::look(scene, &radiance, card.scale, light));
-        let irradiance = card.irradiance(scene, light);
-        let copy = Copy::new(&radiance, card.scale.map(|k| irradiance / std::f64::consts::PI / k));
-        let regions = match &chart {
-            Some(chart) => chart.regions(&first, &radiance, scene)?,
-            None => regions(setup),
-        };
-        let pixels =
-            regions.iter().map(|at| gather::pixels(&radiance, scene, card.scale, light, at)).collect();
-        let outline = correction::outline(scene, &radiance, light);
-        seen.push(SeriesRecord { series: PhotoSeries { shots, card, blur, shadow }, copy, outline, pixels });
+    let mut looked = look::look(folder, setup, chart, observer, &mut Err)?;
+    let left_out = looked.leave_out_hidden();
+    if looked.stacks.is_empty() {
+        let first = left_out.into_iter().next();
+        return Err(first.unwrap_or_else(|| MeasureError::Scene("no photographs".into())));
     }
-    observer.end();
-    let Some((_, scene)) = scene else { return Err(MeasureError::Scene("no photographs".into())) };
-    let blur = linalg::median(&mut seen.iter().map(|seen| seen.series.blur).collect::<Vec<_>>());
-    let scene = scene.with_blur(blur);
-    let scene =
-        scene.with_slips(ResidualShifts::new(seen.iter().map(|seen| series::exposures(&seen.series.shots))));
-    for (i, stack) in stacks.iter().enumerate() {
-        coverage::check(&scene, stack, seen.iter().flat_map(|seen| &seen.pixels[i]))?;
+    let mut taken = finish(setup, looked, observer)?;
+    for error in left_out {
+        let line = format!("left out: {error}");
+        observer.note(&line);
+        taken.measurement.again.push(line);
     }
-    finish(setup, &scene, &stacks, seen, observer)
+    Ok(taken)
 }
 
-/// Where the stacks of a setup file are.
-fn regions(setup: &Setup) -> Vec<Region> {
-    let whole = setup.sample.stack.iter().map(|_| Region::All);
-    whole.chain(setup.patch.iter().map(|patch| Region::Pixels(patch.rectangle_px))).collect()
-}
-
-/// The photographs of each lamp with their exposures.
 /// Some pixels of every stack, spread over the half angles.
 fn samples(scene: &Scene, seen: &[SeriesRecord], patches: usize) -> Vec<GeometrySample> {
     let mut bins: Vec<Vec<GeometrySample>> = vec![Vec::new(); patches * reduce::BINS];
@@ -269,27 +204,6 @@ fn solve(
     solved
 }
 
-/// A series that does not fit its setup file may be one under other light or out of focus: where the dark side of the can or the card shows that,
-/// the refusal says so first.
-fn likelier(error: MeasureError, tape: &Scene, seen: &[SeriesRecord]) -> MeasureError {
-    let foreign = seen.iter().enumerate().any(|(i, seen)| {
-        let grey = seen.series.card.irradiance(tape, i) / std::f64::consts::PI;
-        let shadow = seen.series.shadow.as_ref().map_or(0.0, |shadow| shadow.level[1]);
-        shadow > FOREIGN * grey * seen.series.card.darkest || seen.series.card.advice(i + 1).is_some()
-    });
-    let blur = seen.iter().map(|seen| seen.series.blur).fold(0.0, f64::max);
-    let cause = if foreign {
-        "other light than the lamp's falls on the can or the card, and the geometry does not fit it; cover the table with black cloth, darken \
-         the room, and give a photograph with the lamp off (photos.lamp_off)"
-            .to_owned()
-    } else if let Some(blurred) = blurred(blur, 1) {
-        blurred
-    } else {
-        return error;
-    };
-    MeasureError::Scene(format!("{cause}. Otherwise: {error}"))
-}
-
 /// What light besides the lamp's makes uncertain, as the card and the dark side of the can tell.
 fn light_doubts(seen: &[SeriesRecord]) -> Doubts {
     let most = |of: &dyn Fn(&SeriesRecord) -> f64| seen.iter().map(of).fold(0.0, f64::max);
@@ -318,20 +232,15 @@ fn light_doubts(seen: &[SeriesRecord]) -> Doubts {
     }
 }
 
-fn finish(
-    setup: &Setup,
-    tape: &Scene,
-    patches: &[Stack],
-    mut seen: Vec<SeriesRecord>,
-    observer: &dyn Observer,
-) -> Result<Taken, MeasureError> {
+fn finish(setup: &Setup, looked: Looked, observer: &dyn Observer) -> Result<Taken, MeasureError> {
+    let Looked { scene: ref tape, stacks: ref patches, mut seen } = looked;
     observer.begin("fitting the geometry", 1);
     let shots: Vec<&[Shot]> = seen.iter().map(|seen| &*seen.series.shots).collect();
     let measures = measures::measures(setup, &shots);
     let outline: Vec<[f64; 2]> = seen.iter().flat_map(|seen| seen.outline.iter().copied()).collect();
     let solved = solve(tape, patches.len(), &seen, &outline, &measures);
     measures::check(setup, tape, &outline, &measures, &solved)
-        .map_err(|error| likelier(error, tape, &seen))?;
+        .map_err(|error| advice::likelier(error, tape, &seen))?;
     observer.end();
     let trusted = setup.geometry == Trust::Known;
     let scene = if trusted { tape.clone() } else { solved.scene.clone() };
@@ -400,72 +309,9 @@ fn finish(
         stacks,
         again: Vec::new(),
     };
-    let light = light_advice(setup, &scene, &measurement);
-    measurement.again = advice(&measurement);
+    let light = advice::light(setup, &scene, &measurement);
+    measurement.again = advice::of(&measurement);
     measurement.again.extend(light);
     measurement.again.iter().for_each(|line| observer.note(line));
     Ok(Taken { measurement, pictures })
-}
-
-/// What to do about a lens that blurs.
-fn blurred(blur: f64, lamp: usize) -> Option<String> {
-    (blur > OUT_OF_FOCUS).then(|| {
-        format!(
-            "lamp {lamp}: the card's edges are blurred by {blur:.1} pixels, so the lens is out of focus or the camera shook: focus on the card, and \
-             close the aperture to f/8"
-        )
-    })
-}
-
-/// What the dark side of the can says of the light.
-fn light_advice(setup: &Setup, scene: &Scene, measurement: &Measurement) -> Vec<String> {
-    let mut said = Vec::new();
-    for (i, series) in measurement.series.iter().enumerate() {
-        let Some(shadow) = &series.shadow else { continue };
-        let light = series.card.irradiance(scene, i);
-        let mut worst: Option<(f64, &str)> = None;
-        for stack in &measurement.stacks {
-            let rows = stack.rows.iter().filter(|row| row.kind == reduce::SampleOrigin::Measured);
-            for row in rows.filter(|row| row.theta_deg < 60.0) {
-                let shares = (0..3).map(|c| shadow.level[c] / light / row.rgb[c].max(1e-9));
-                let share = shares.fold(0.0, f64::max);
-                if worst.is_none_or(|worst| share > worst.0) {
-                    worst = Some((share, &stack.stack));
-                }
-            }
-        }
-        if let Some((share, stack)) = worst.filter(|worst| worst.0 > FOREIGN) {
-            said.push(format!(
-                "lamp {}: other light than the lamp's is on the can or strays in the lens: its dark side shows {:.0} % of what {stack} reflects where \
-                 it is darkest; cover the table with black cloth, darken the room, and give a photograph with the lamp off (photos.lamp_off)",
-                i + 1,
-                100.0 * share
-            ));
-        }
-        let given = setup.light[i].diameter_mm;
-        if shadow.lamp_mm > 2.0 * given && given < shadow.lamp_mm {
-            said.push(format!(
-                "lamp {}: the lamp is about {:.0} mm wide, as the edge of the can's dark side shows, and the setup file says {given:.0}: correct \
-                 light.diameter_mm, or use a smaller lamp",
-                i + 1,
-                shadow.lamp_mm
-            ));
-        }
-    }
-    said
-}
-
-/// What a second try should do otherwise, as each step judges it.
-fn advice(measurement: &Measurement) -> Vec<String> {
-    let mut again = Vec::new();
-    for (i, series) in measurement.series.iter().enumerate() {
-        let clipped = measurement.stacks.iter().filter(|stack| coverage::is_clipped(&stack.rows));
-        let clipped: Vec<&str> = clipped.map(|stack| &*stack.stack).collect();
-        again.extend(series.card.advice(i + 1));
-        again.extend(blurred(series.blur, i + 1));
-        again.extend(series::advice(&series.shots, i + 1, &clipped));
-    }
-    again.extend(measurement.stacks.iter().flat_map(|stack| coverage::advice(&stack.stack, &stack.rows)));
-    again.extend(measures::advice(measurement.geometry.misfit));
-    again
 }
