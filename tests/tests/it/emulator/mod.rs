@@ -8,6 +8,7 @@ mod flash;
 mod found;
 mod image;
 mod rig;
+mod served;
 
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};

@@ -3,7 +3,7 @@
 use std::fs;
 use std::io::{BufRead as _, BufReader};
 use std::net::SocketAddr;
-use std::process::{Child, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crate::queue::server::{self, Server};
@@ -26,14 +26,17 @@ use testing::program::Bench;
 const PATIENCE: Duration = Duration::from_secs(300);
 
 /// The program as a server.
-struct Serving {
+pub(crate) struct Serving {
     child: Child,
-    address: SocketAddr,
+    pub(crate) address: SocketAddr,
 }
 
 impl Serving {
     fn start(bench: &Bench, to: &str) -> Serving {
-        let mut command = bench.command(&format!("serve --listen 127.0.0.1:0 --to {to}"));
+        Serving::of(bench.command(&format!("serve --listen 127.0.0.1:0 --to {to}")))
+    }
+
+    pub(crate) fn of(mut command: Command) -> Serving {
         let mut child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
         let said = BufReader::new(child.stdout.take().unwrap()).lines();
         // `ipp://127.0.0.1:40001/ipp/print/standard  ALPS MD-5500`
@@ -44,12 +47,12 @@ impl Serving {
     }
 
     /// As a crash would end it.
-    fn kill(mut self) {
+    pub(crate) fn kill(mut self) {
         self.child.kill().unwrap();
         self.child.wait().unwrap();
     }
 
-    fn wait_for(&self, job: i32) -> i32 {
+    pub(crate) fn wait_for(&self, job: i32) -> i32 {
         let start = Instant::now();
         loop {
             match ipp::state(self.address, job) {
