@@ -31,7 +31,7 @@ pub(super) fn of_paper(photos: &[PhotoFigures]) -> Option<String> {
                         !stack.layers().is_empty() && those.is_none_or(|those| those(&stack))
                     })
                 });
-                common(&inked.collect::<Vec<_>>(), if those.is_some() { 1 } else { 2 })
+                common(&inked.collect::<Vec<_>>(), if those.is_some() { 1 } else { 2 }, [ALIKE, COMMON])
             })
             .collect();
         if !found.is_empty() && 2 * found.len() > photos.len() {
@@ -48,19 +48,63 @@ pub(super) fn of_paper(photos: &[PhotoFigures]) -> Option<String> {
 }
 
 /// The factor that these stacks have in common, if there are as many and they differ alike.
-fn common(stacks: &[&Factor], least: usize) -> Option<[f64; 3]> {
+fn common(stacks: &[&Factor], least: usize, [alike, common]: [f64; 2]) -> Option<[f64; 3]> {
     if stacks.len() < least || !stacks.iter().any(|factor| factor.differs) {
         return None;
     }
     let whole: f64 = stacks.iter().map(|factor| factor.share).sum();
     let mean: [f64; 3] =
         std::array::from_fn(|c| stacks.iter().map(|f| f.share * f.factor[c]).sum::<f64>() / whole.max(1e-12));
-    let alike = |factor: &&Factor| {
+    let is_alike = |factor: &&Factor| {
         (0..3).all(|c| {
             let (off, error) = ((factor.factor[c] - mean[c]).abs(), factor.standard_error[c]);
-            off < (ALIKE * (mean[c] - 1.0).abs()).max(2.0 * error)
+            off < (alike * (mean[c] - 1.0).abs()).max(2.0 * error)
         })
     };
-    let differs = mean.iter().any(|factor| (factor - 1.0).abs() > COMMON);
-    (differs && stacks.iter().all(alike)).then_some(mean)
+    let differs = mean.iter().any(|factor| (factor - 1.0).abs() > common);
+    (differs && stacks.iter().all(is_alike)).then_some(mean)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Figures of stacks that differ by these factors, told as a camera tells them.
+    fn stacks(factors: &[f64]) -> Vec<Factor> {
+        let figure = |factor: &f64| Factor {
+            stack: "MS".into(),
+            factor: [*factor; 3],
+            standard_error: [0.002; 3],
+            share: 0.2,
+            differs: (factor - 1.0).abs() > 0.01,
+        };
+        factors.iter().map(figure).collect()
+    }
+
+    /// Paper that is darker makes everything on it brighter by one factor; inks that are off are off by factors of their own. Neither answer
+    /// changes if the two choices move by a fifth.
+    #[test]
+    fn paper_is_told_from_inks_whatever_the_choices_are() {
+        for rules in [ALIKE * 0.8, ALIKE, ALIKE * 1.2]
+            .into_iter()
+            .flat_map(|alike| [COMMON * 0.8, COMMON, COMMON * 1.2].map(|common| [alike, common]))
+        {
+            let answer = |factors: &[f64]| {
+                let stacks = stacks(factors);
+                common(&stacks.iter().collect::<Vec<_>>(), 2, rules).map(|mean| mean[1])
+            };
+            for paper in [0.85, 0.93, 1.1] {
+                // Within a tenth of the difference, which is what other inks than the library's add.
+                let by = |k: f64| 1.0 + (1.0 / paper - 1.0) * k;
+                let found = answer(&[by(0.9), by(1.0), by(1.1)]).expect("the paper");
+                assert!((found * paper - 1.0).abs() < 0.01, "{paper}: {found}");
+                // One ink is off, and the others are not; or each is by something else.
+                assert_eq!(answer(&[by(1.0), 1.0, 1.0]), None);
+                assert_eq!(answer(&[by(1.0), by(0.4), by(-0.3)]), None);
+            }
+            // Nothing that is worth a word.
+            assert_eq!(answer(&[1.011, 1.012, 1.013]), None);
+            assert_eq!(answer(&[1.2]), None);
+        }
+    }
 }
