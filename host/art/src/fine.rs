@@ -117,7 +117,7 @@ impl Strip {
 
     #[inline(always)]
     fn pick<const N: usize>(&self, mixtures: &Mixtures<'_, N>, table: &Table, out: &mut [u8]) {
-        let mut leans = Leans::new(&self.keys, self.width);
+        let mut leans = Leans::new(&self.keys, self.width, mixtures.rules.apart);
         let mut known = Known::new(mixtures);
         for (y, out) in self.own.clone().zip(out.chunks_exact_mut(self.width)) {
             let thresholds = table.row(self.top + y - self.own.start);
@@ -125,7 +125,7 @@ impl Strip {
             let mut at = (Key::MAX, [0; N]);
             for ((number, keys), out) in keys.chunks(BLOCK).enumerate().zip(out.chunks_mut(BLOCK)) {
                 if keys[0] != at.0 {
-                    at = (keys[0], *known.stops(keys[0]));
+                    at = (keys[0], known.stops(keys[0]));
                 }
                 let thresholds = &thresholds[number * BLOCK % SIDE..][..keys.len()];
                 // Most of a page is paper.
@@ -135,12 +135,12 @@ impl Strip {
                 }
                 for ((&key, &threshold), out) in keys.iter().zip(thresholds).zip(out) {
                     if key != at.0 {
-                        at = (key, *known.stops(key));
+                        at = (key, known.stops(key));
                     }
                     *out = mixtures.order[Mixtures::pick(&at.1, threshold)];
                 }
             }
-            for lean in leans.row(y) {
+            for lean in leans.row(y, |key| mixtures.is_named(colour(key))) {
                 let stops = known.leaning(lean);
                 out[lean.x] = mixtures.order[Mixtures::pick(&stops, thresholds[lean.x % SIDE])];
             }
@@ -194,7 +194,7 @@ fn are_alike(keys: &[Key], own: Key) -> bool {
     keys.iter().fold(0, |other, key| other | (key ^ own)) == 0
 }
 
-/// The stops of the colours that were asked for last, by a hash.
+/// The stops of the flat colours that were asked for last, by a hash.
 struct Known<'a, const N: usize> {
     mixtures: &'a Mixtures<'a, N>,
     last: Vec<(Key, Stops<N>)>,
@@ -211,20 +211,27 @@ impl<'a, const N: usize> Known<'a, N> {
     }
 
     #[inline(always)]
-    fn stops(&mut self, key: Key) -> &Stops<N> {
+    fn stops(&mut self, key: Key) -> Stops<N> {
+        let drawn = key & DRAWN > 0;
+        // The step of a shading in a picture is no colour of its own.
+        let is_flat = key & if drawn { FLAT } else { AREA } > 0;
+        // A photograph's colours hardly ever return.
+        match is_flat || key & LABEL > 0 {
+            true => self.kept(key),
+            false => self.mixtures.stops(colour(key), drawn),
+        }
+    }
+
+    fn kept(&mut self, key: Key) -> Stops<N> {
         let known = &mut self.last[place(key)];
         if known.0 != key {
-            let drawn = key & DRAWN > 0;
-            // The step of a shading in a picture is no colour of its own.
-            let is_flat = key & if drawn { FLAT } else { AREA } > 0;
             let stops = match key & LABEL > 0 {
                 true => self.mixtures.label(colour(key)),
-                false if is_flat => self.mixtures.flat(colour(key), drawn),
-                false => self.mixtures.stops(colour(key), drawn),
+                false => self.mixtures.flat(colour(key), key & DRAWN > 0),
             };
             *known = (key, stops);
         }
-        &known.1
+        known.1
     }
 
     fn leaning(&mut self, lean: &lean::Lean) -> Stops<N> {
@@ -232,8 +239,8 @@ impl<'a, const N: usize> Known<'a, N> {
         let at = place(lean.own.rotate_left(7) ^ lean.other.rotate_left(1) ^ Key::from(lean.at_edge));
         if self.leaning[at].0 != key {
             // Beside an edge a colour of a picture is an area, too.
-            let (own, other) = (*self.stops(lean.own | AREA), *self.stops(lean.other | AREA));
-            self.leaning[at] = (key, lean::leaning(&own, &other, lean.at_edge));
+            let (own, other) = (self.stops(lean.own | AREA), self.stops(lean.other | AREA));
+            self.leaning[at] = (key, lean::leaning(&own, &other, lean.at_edge, self.mixtures.rules.part));
         }
         self.leaning[at].1
     }

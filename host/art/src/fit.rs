@@ -26,6 +26,8 @@ pub(super) struct Wishes {
     pub gamma: f64,
     /// Whether text or a drawing has any of the colours.
     pub has_drawings: bool,
+    /// Whether a picture has any.
+    pub has_pictures: bool,
 }
 
 /// The nodes of the lattices, fitted.
@@ -60,7 +62,10 @@ impl Fit {
         observer: &dyn Observer,
     ) -> Result<Fit, Diagnosis> {
         let intents: &[Intent] = match wishes.intent {
-            Intent::Auto if wishes.has_drawings => &[Intent::Perceptual, Intent::Colorimetric],
+            Intent::Auto if wishes.has_drawings && wishes.has_pictures => {
+                &[Intent::Perceptual, Intent::Colorimetric]
+            }
+            Intent::Auto if wishes.has_drawings => &[Intent::Colorimetric],
             Intent::Auto | Intent::Perceptual => &[Intent::Perceptual],
             Intent::Colorimetric => &[Intent::Colorimetric],
         };
@@ -76,7 +81,7 @@ impl Fit {
             mix = lattice.even(mix, 0, printable).map_err(unfitted)?;
         }
         let of_drawings = intents.len() - 1;
-        if of_drawings > 0 {
+        if wishes.intent == Intent::Auto && wishes.has_drawings {
             let light = |level: f64| f64::from(srgb::decode(level.powf(1.0 / wishes.gamma) as f32));
             mix =
                 with_tints(mix, of_drawings, near, light, |colour| solids.named(colour)).map_err(unfitted)?;
@@ -152,11 +157,12 @@ mod tests {
         (0..fit.stacks.len()).map(|stack| share(stack) / one).collect()
     }
 
-    const DRAWN: Wishes = Wishes { intent: Intent::Auto, gamma: 1.0, has_drawings: true };
+    const DRAWN: Wishes = Wishes { intent: Intent::Auto, gamma: 1.0, has_drawings: true, has_pictures: true };
 
     /// What is printed for each pixel of a picture, between black and paper in linear light.
     fn printed(pixels: &[[u8; 3]], intent: Intent) -> Vec<Light> {
-        let (fit, printable) = fitted(&Wishes { intent, gamma: 1.0, has_drawings: false });
+        let (fit, printable) =
+            fitted(&Wishes { intent, gamma: 1.0, has_drawings: false, has_pictures: true });
         let (bare, black) = ends(&printable, &Space::half_angle(SAMPLES));
         let row = |stack: &Stack| {
             printable.curves.row(printable.stacks.iter().position(|known| known == stack).unwrap())
@@ -185,7 +191,7 @@ mod tests {
             for (grey, light) in greys.iter().zip(printed(&greys, intent)) {
                 assert!((light[1] - linear(*grey)[1]).abs() < 0.02, "{grey:?} is printed as {light:?}");
             }
-            let (fit, _) = fitted(&Wishes { intent, gamma: 1.0, has_drawings: false });
+            let (fit, _) = fitted(&Wishes { intent, gamma: 1.0, has_drawings: false, has_pictures: true });
             let paper = fit.stacks.iter().position(|stack| stack.layers().is_empty()).unwrap();
             assert_eq!(shares(&fit, [255; 3], false)[paper], 1.0, "white has no ink");
         }
