@@ -130,6 +130,9 @@ mod tests {
     use appearance::weights::ONE;
     use inks::{InkSet, Library};
     use observe::Silent;
+    use palette::convert::FromColorUnclamped;
+    use palette::white_point::D65;
+    use palette::{Lab, LinSrgb};
     use protocol::ink::Kind;
 
     fn fitted(wishes: &Wishes) -> (Fit, Printable) {
@@ -304,6 +307,26 @@ mod tests {
             assert!((of(name) - share).abs() < 0.005, "{name}: {} of {share}", of(name));
             assert!((of(name) + of(ground) - 1.0).abs() < 0.002, "{name}: {shares:?}");
         }
+    }
+
+    /// Tints change the hue of a pink by hardly more than an eye takes for the same.
+    #[test]
+    fn a_drawn_pink_looks_about_as_colorimetric_does() {
+        let lab = |wishes: &Wishes, is_drawn: bool| {
+            let (fit, printable) = fitted(wishes);
+            let space = Space::half_angle(SAMPLES);
+            let solids = Solids::new(&printable, &space);
+            let shares = shares(&fit, [255, 128, 128], is_drawn);
+            let parts = || fit.stacks.iter().map(|stack| solids.body(stack)).zip(&shares);
+            let [r, g, b] = std::array::from_fn(|c| parts().map(|(body, share)| share * body[c]).sum());
+            Lab::<D65, f64>::from_color_unclamped(LinSrgb::<f64>::new(r, g, b))
+        };
+        let drawn = lab(&DRAWN, true);
+        let exact = lab(&Wishes { intent: Intent::Colorimetric, ..DRAWN }, false);
+        let off = [drawn.l - exact.l, drawn.a - exact.a, drawn.b - exact.b];
+        let off = off.into_iter().map(|v| v * v).sum::<f64>().sqrt();
+        println!("{drawn:?} and {exact:?}: {off:.1}");
+        assert!(off <= 12.0, "{drawn:?} and {exact:?}: {off}");
     }
 
     /// It was 0.6 over the last sixteenth: a dark band at the end.

@@ -9,8 +9,8 @@ use std::ops::Range;
 use std::sync::LazyLock;
 
 use super::edges::Edges;
-use super::key::{BLACK, DRAWN, Key, LABEL, colour, key, of_drawn};
-use super::kinds::{BYTES, K_OF_PICTURES, ObjectType, split};
+use super::key::{DRAWN, Key, LABEL, colour, key, of_drawn};
+use super::kinds::{BYTES, INKS_OF_PICTURES, ObjectType, split};
 use super::resample;
 use appearance::srgb;
 use appearance::wide::wide;
@@ -82,10 +82,15 @@ impl Pixels {
 
 #[inline(always)]
 fn key_of<const N: usize>(pixel: &[u8; N], labels: bool) -> Key {
-    match split(pixel) {
-        (ObjectType::Picture, K_OF_PICTURES) if N == BYTES => BLACK,
-        (kind, colour) => of_drawn(kind, colour, labels),
+    let (kind, colour) = split(pixel);
+    if N < BYTES || kind != ObjectType::Picture {
+        return of_drawn(kind, colour, labels);
     }
+    // All are compared, without a branch.
+    let own = key(colour, false);
+    INKS_OF_PICTURES
+        .iter()
+        .fold(own, |found, &(of, named)| if own == key(of, false) { key(named, false) } else { found })
 }
 
 fn row<const N: usize>(

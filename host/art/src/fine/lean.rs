@@ -50,10 +50,11 @@ fn is_edge(a: Key, b: Key, apart: u32) -> bool {
 }
 
 impl<'a> Leans<'a> {
+    /// Of rows of dots, of which some are `even`: of one colour.
     #[inline(always)]
-    pub fn new(keys: &'a [Key], width: usize, apart: u32) -> Leans<'a> {
+    pub fn new(keys: &'a [Key], even: &[Option<Key>], apart: u32) -> Leans<'a> {
         let mut edges = vec![0; keys.len()];
-        let rows = keys.len() / width;
+        let (rows, width) = (even.len(), keys.len() / even.len());
         let mut mark = |from: std::ops::Range<usize>, way: usize, (here, there): (u8, u8)| {
             for start in from.clone().step_by(BLOCK) {
                 let block = start..(start + BLOCK).min(from.end);
@@ -67,16 +68,21 @@ impl<'a> Leans<'a> {
                 if !a.iter().zip(b).fold(false, |any, (&a, &b)| any | is_edge(a, b, apart)) {
                     continue;
                 }
-                for at in block.filter(|&at| is_edge(keys[at], keys[at + way], apart)) {
-                    edges[at] |= here;
-                    edges[at + way] |= there;
-                }
+                let mark = |edges: &mut [u8], side: u8| {
+                    for (edges, (&a, &b)) in edges.iter_mut().zip(a.iter().zip(b)) {
+                        *edges |= side * u8::from(is_edge(a, b, apart));
+                    }
+                };
+                mark(&mut edges[block.clone()], here);
+                mark(&mut edges[block.start + way..block.end + way], there);
             }
         };
         for y in 0..rows {
             let row = y * width..(y + 1) * width;
-            mark(row.start..row.end - 1, 1, (2, 1));
-            if y + 1 < rows {
+            if even[y].is_none() {
+                mark(row.start..row.end - 1, 1, (2, 1));
+            }
+            if y + 1 < rows && (even[y].is_none() || even[y] != even[y + 1]) {
                 mark(row, width, (8, 4));
             }
         }

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use super::super::fit::Wishes;
 use super::super::intent::Intent;
 use super::super::key::key;
-use super::super::kinds::ObjectType;
+use super::super::kinds::{INKS_OF_PICTURES, ObjectType};
 use super::super::pixels::Pixels;
 use super::mixtures::Rules;
 use super::*;
@@ -101,6 +101,18 @@ fn a_colour_that_is_a_stack_is_that_stack() {
                 assert_eq!(dots[at], stack(name), "{colour:?} of {kind:?} at {}, {}", at % 64, at / 64);
             }
         }
+    }
+}
+
+/// As a mask in CMYK has it.
+#[test]
+fn full_inks_of_a_picture_in_a_page_are_these_inks() {
+    for (colour, named) in INKS_OF_PICTURES {
+        let dots = |colour: [u8; 3]| {
+            let art = Art::new(64, 64, |x, y| if (x / 3 + y / 3) % 2 > 0 { colour } else { [255; 3] });
+            art.dots(ObjectType::Picture, (64, 64))
+        };
+        assert_eq!(dots(colour), dots(named), "{colour:?}");
     }
 }
 
