@@ -8,12 +8,11 @@
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
+use super::super::intent::Light;
 use super::super::kinds::ObjectType;
 use super::mixtures::{Rules, shares};
 use super::tests::{Art, INKS, stack};
 use super::*;
-
-type Light = [f64; 3];
 
 /// Dots along each side of the art, 22 mm.
 pub(super) const SIDE: usize = 512;
@@ -416,9 +415,8 @@ fn tints_are_even_and_their_dots_hang_together() {
         }
     }
     let lone = lone.iter().sum::<f64>() / lone.len() as f64;
-    println!("lone dots {lone:.3}");
+    println!("lone dots {lone:.3}, grain {grain:?}");
     assert!(lone <= 0.05, "{lone} of the dots lie alone");
-    println!("grain {grain:?}");
     assert!(grain[0] <= 1.5 && grain[1] <= 0.6, "{grain:?}");
 }
 
