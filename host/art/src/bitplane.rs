@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::window::Window;
+use appearance::wide::wide;
 use sheet::Plane;
 
 /// A plane without ink.
@@ -25,9 +26,19 @@ pub(super) fn from_bytes(width: usize, bytes: &[u8], ink: impl Fn(u8) -> bool + 
 pub(super) fn from<T: Sync>(width: usize, dots: &[T], ink: impl Fn(&T) -> bool + Sync) -> Plane {
     let mut plane = blank(width, dots.len() / width);
     plane.bits.par_chunks_mut(plane.stride).zip(dots.par_chunks_exact(width)).for_each(|(bits, dots)| {
-        for (bits, dots) in bits.iter_mut().zip(dots.chunks(8)) {
-            *bits = dots.iter().zip(0..).fold(0, |bits, (dot, at)| bits | u8::from(ink(dot)) << (7 - at));
-        }
+        wide(
+            #[inline(always)]
+            || {
+                let (eights, rest) = dots.as_chunks::<8>();
+                let byte = |dots: &[T]| {
+                    dots.iter().zip(0..).fold(0, |bits, (dot, at)| bits | u8::from(ink(dot)) << (7 - at))
+                };
+                bits.iter_mut().zip(eights).for_each(|(bits, eight)| *bits = byte(eight));
+                if let (Some(last), false) = (bits.last_mut(), rest.is_empty()) {
+                    *last = byte(rest);
+                }
+            },
+        );
     });
     plane
 }

@@ -17,7 +17,7 @@ use super::fine;
 use super::fit::{Fit, Wishes};
 use super::intent::Intent;
 use super::key::{BLACK, Key, LABEL, WHITE, colour as colour_of, of_drawn};
-use super::kinds::{BYTES, ObjectType, split};
+use super::kinds::{ObjectType, split};
 use super::lattice::ends;
 use super::pixels::{Pixels, Rows};
 use super::solids::Solids;
@@ -25,10 +25,14 @@ use super::tones;
 use appearance::brdf::Space;
 use appearance::document::SAMPLES;
 use appearance::gamut::Printable;
+use appearance::wide::wide;
 use halftone::green_noise::Table;
 use halftone::{Method, halftone};
 use observe::{Diagnosis, Observer};
 use sheet::{Plane, pack};
+
+/// Dots that are looked at together.
+const BLOCK: usize = 32;
 
 /// Colours to print with the process inks.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,8 +49,52 @@ enum Drawn {
     Black(Plane),
     /// For each dot the number of its colour.
     Numbered(Vec<(ObjectType, [u8; 3])>, Vec<u8>),
-    /// Pixels, which are read when their dots are picked.
-    Pixels(Pixels),
+    /// Pixels, which are read when their dots are picked, and what drew them.
+    Pixels(Pixels, Drew),
+}
+
+/// What drew colours other than white.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+struct Drew {
+    any: bool,
+    /// Whether there are tones of pictures, and of text and drawings: black and white are none.
+    pictures: bool,
+    drawings: bool,
+}
+
+impl Drew {
+    fn of<const N: usize>(pixels: &[[u8; N]]) -> Drew {
+        let (mut any, mut pictures, mut drawings) = (false, false, false);
+        wide(
+            #[inline(always)]
+            || {
+                for pixel in pixels {
+                    let (kind, [r, g, b]) = split(pixel);
+                    let is_tone = (r & g & b != 255) & (r | g | b != 0);
+                    let is_picture = kind == ObjectType::Picture;
+                    any |= r & g & b != 255;
+                    pictures |= is_tone & is_picture;
+                    drawings |= is_tone & !is_picture;
+                }
+            },
+        );
+        Drew { any, pictures, drawings }
+    }
+
+    fn and(self, other: Drew) -> Drew {
+        Drew {
+            any: self.any | other.any,
+            pictures: self.pictures | other.pictures,
+            drawings: self.drawings | other.drawings,
+        }
+    }
+}
+
+/// The dots of the process inks.
+pub(super) struct Picked {
+    pub planes: Vec<(Ink, Plane)>,
+    /// The number of each dot's stack, and for each number the planes that have it, a bit each; `None` for black alone.
+    pub stacks: Option<(Vec<u8>, [u16; 256])>,
 }
 
 /// How the colours become dots.
@@ -73,7 +121,14 @@ impl Colour {
     ) -> Option<Colour> {
         let used = index.par_chunks(1 << 16).map(|dots| {
             let mut used = [false; 256];
-            dots.iter().for_each(|&dot| used[usize::from(dot)] = true);
+            for dots in dots.chunks(BLOCK) {
+                // Most of a page is one colour.
+                if dots.iter().fold(0, |other, dot| other | (dot ^ dots[0])) == 0 {
+                    used[usize::from(dots[0])] = true;
+                } else {
+                    dots.iter().for_each(|&dot| used[usize::from(dot)] = true);
+                }
+            }
             used
         });
         let used = used.reduce(|| [false; 256], |a, b| std::array::from_fn(|at| a[at] | b[at]));
@@ -88,12 +143,10 @@ impl Colour {
 
     /// The colours of pixels of three bytes, or of four with a tag before them; `None` if all are white.
     pub(super) fn of_pixels<const N: usize>(bytes: Vec<u8>, size: (u32, u32)) -> Option<Colour> {
-        let is_white = |pixels: &[[u8; N]]| {
-            pixels.iter().fold(255, |all, pixel| all & split(pixel).1.iter().fold(255, |a, v| a & v)) == 255
-        };
-        let white = bytes.as_chunks::<N>().0.par_chunks(1 << 12).all(is_white);
+        let parts = bytes.as_chunks::<N>().0.par_chunks(1 << 12).map(Drew::of);
+        let drew = parts.reduce(Drew::default, Drew::and);
         let pixels = Pixels { bytes, each: N, width: size.0 as usize, height: size.1 as usize };
-        (!white).then_some(Colour { drawn: Drawn::Pixels(pixels), overprints: false })
+        drew.any.then_some(Colour { drawn: Drawn::Pixels(pixels, drew), overprints: false })
     }
 
     /// What writes the colours of rows of so many dots; `labels` says whether text is a label.
@@ -112,27 +165,32 @@ impl Colour {
             Drawn::Numbered(colours, index) => {
                 let keys: Vec<Key> = colours.iter().map(|&(kind, rgb)| of_drawn(kind, rgb, labels)).collect();
                 Box::new(move |rows, out| {
-                    out.iter_mut()
-                        .zip(&index[of_rows(rows)])
-                        .for_each(|(out, &dot)| *out = keys[usize::from(dot)]);
+                    for (out, dots) in out.chunks_mut(BLOCK).zip(index[of_rows(rows)].chunks(BLOCK)) {
+                        if dots.iter().fold(0, |other, dot| other | (dot ^ dots[0])) == 0 {
+                            out.fill(keys[usize::from(dots[0])]);
+                        } else {
+                            out.iter_mut().zip(dots).for_each(|(out, &dot)| *out = keys[usize::from(dot)]);
+                        }
+                    }
                 })
             }
-            Drawn::Pixels(pixels) => pixels.rows(dots, labels),
+            Drawn::Pixels(pixels, _) => pixels.rows(dots, labels),
         }
     }
 
-    /// The plane of each process ink that the colours need.
-    pub(super) fn planes(
+    /// The dots of the process inks that the colours need.
+    pub(super) fn picked(
         &self,
         dots: (usize, usize),
         inks: &InkSet,
         how: How,
         library: &Library,
         observer: &dyn Observer,
-    ) -> Result<Vec<(Ink, Plane)>, Diagnosis> {
+    ) -> Result<Picked, Diagnosis> {
         if let Drawn::Black(black) = &self.drawn {
             let inks = black_inks(inks, library);
-            return Ok(inks.into_iter().map(|ink| (ink, black.clone())).collect());
+            let planes = inks.into_iter().map(|ink| (ink, black.clone())).collect();
+            return Ok(Picked { planes, stacks: None });
         }
         let (stacks, index) = self.stacks(dots, inks, how, library, observer)?;
         let mut inks_of = [0u16; 256];
@@ -141,7 +199,7 @@ impl Colour {
             *inks_of = has.fold(0, |bits, (at, _)| bits | 1 << at);
         }
         let planes = pack::pack(dots.0, &index, &inks_of, inks.len());
-        Ok(inks.iter().zip(planes).collect())
+        Ok(Picked { planes: inks.iter().zip(planes).collect(), stacks: Some((index, inks_of)) })
     }
 
     /// Stacks of process inks, and the number of the stack of each dot.
@@ -156,11 +214,12 @@ impl Colour {
         let space = Space::half_angle(SAMPLES);
         let printable = Printable::from_library(library, inks, &space);
         let solids = Solids::new(&printable, &space);
-        let has_drawings = match &self.drawn {
-            Drawn::Pixels(pixels) => pixels.each == BYTES,
-            _ => true,
+        let (has_pictures, has_drawings) = match &self.drawn {
+            Drawn::Pixels(_, drew) => (drew.pictures, drew.drawings),
+            // A numbered page has no tones of pictures.
+            _ => (false, true),
         };
-        let wishes = Wishes { intent: how.intent, gamma: how.gamma, has_drawings };
+        let wishes = Wishes { intent: how.intent, gamma: how.gamma, has_drawings, has_pictures };
         let mut fit = Fit::new((&printable, &solids), space, &wishes, observer)?;
         let rows = self.rows(dots, how.labels);
         if how.halftone == Method::Fine {

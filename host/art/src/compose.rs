@@ -22,7 +22,7 @@ use serde::Serialize;
 
 use super::artwork::{Artwork, Shape};
 use super::bitplane;
-use super::colour::How;
+use super::colour::{How, Picked};
 use super::error::{
     foil, no_sheet, not_halftoned, nothing, only_white, too_many_passes, too_small, unfitted,
 };
@@ -86,7 +86,7 @@ pub fn compose(
     if art.width as u64 * art.length as u64 == 0 {
         return Err(too_small(art.width as f64 * MM, art.length as f64 * MM));
     }
-    let mut slots = drawn_slots(art, settings, library, observer, &mut tell)?;
+    let (mut slots, picked) = drawn_slots(art, settings, library, observer, &mut tell)?;
     beds::lay_white(&mut slots, art, settings, &mut tell)?;
     beds::lay_finish(&mut slots, art, settings)?;
     slots.retain(|slot| slot.plane.dots() > 0);
@@ -116,17 +116,27 @@ pub fn compose(
             slots.iter().flat_map(|slot| vec![slot.ink.name(); slot.passes]).collect::<Vec<_>>().join(", ");
         return Err(too_many_passes(passes, &inks));
     }
-    stack_up(art, &slots, settings, notes)
+    // White and finish beneath and on them make other stacks of what was picked.
+    let is_bare = matches!(settings.white, None | Some(White::None))
+        && matches!(settings.finish, None | Some(Finish::None));
+    stack_up(art, &slots, picked.filter(|_| is_bare), settings, notes)
 }
 
-/// The layers of the art itself, with tones and colours halftoned.
+/// The stack of each dot, and for each stack the inks that it has, a bit each.
+struct Stacked {
+    index: Vec<u8>,
+    inks_of: [u16; 256],
+    inks: Vec<Ink>,
+}
+
+/// The layers of the art itself, with tones and colours halftoned; and what was picked for its colours if it has nothing else.
 fn drawn_slots(
     art: &Artwork,
     settings: &Settings,
     library: &Library,
     observer: &dyn Observer,
     tell: &mut dyn FnMut(String),
-) -> Result<Vec<Slot>, Diagnosis> {
+) -> Result<(Vec<Slot>, Option<Stacked>), Diagnosis> {
     let mut slots: Vec<Slot> = Vec::new();
     let mut together = picked_together(art, settings, library)?;
     for (at, layer) in art.layers.iter().enumerate() {
@@ -161,7 +171,7 @@ fn drawn_slots(
         let process = InkSet::of(settings.inks.iter().filter(|ink| ink.kind() == Kind::Process));
         if process.is_empty() {
             tell("the picture's colours are left out, because no process ink is allowed".into());
-            return Ok(slots);
+            return Ok((slots, None));
         }
         let how = How {
             intent: settings.intent,
@@ -169,7 +179,14 @@ fn drawn_slots(
             halftone: settings.halftone,
             labels: settings.text == Text::Solid,
         };
-        let planes = colour.planes((art.width, art.length), &process, how, library, observer)?;
+        let Picked { planes, stacks } =
+            colour.picked((art.width, art.length), &process, how, library, observer)?;
+        if slots.is_empty() {
+            let inks = planes.iter().map(|(ink, _)| *ink).collect();
+            let slot = |(ink, plane)| Slot { ink, from: COLOURS.into(), place: None, plane, passes: 1 };
+            let stacked = stacks.map(|(index, inks_of)| Stacked { index, inks_of, inks });
+            return Ok((planes.into_iter().map(slot).collect(), stacked));
+        }
         let mut spot = bitplane::blank(art.width, art.length);
         slots.iter().for_each(|slot| bitplane::add(&mut spot, &slot.plane));
         for (ink, mut plane) in planes {
@@ -183,7 +200,7 @@ fn drawn_slots(
             }
         }
     }
-    Ok(slots)
+    Ok((slots, None))
 }
 
 /// The numbers of the layers with tones of process inks whose dots are picked from one table, and their dots.
@@ -276,16 +293,42 @@ fn layers(slots: &[Slot], mask: usize, settings: &Settings) -> Vec<Ink> {
     layers
 }
 
-/// Makes a stack of every combination of slots that occurs.
+/// Makes a stack of every combination of slots that occurs. What was `picked` is these slots, a dot at a time.
 fn stack_up(
     art: &Artwork,
     slots: &[Slot],
+    picked: Option<Stacked>,
     settings: &Settings,
     notes: Vec<String>,
 ) -> Result<Composed, Diagnosis> {
     let (width, length) = (art.width, art.length);
     let planes: Vec<&Plane> = slots.iter().map(|slot| &slot.plane).collect();
-    let census = pack::census(&planes, width, length);
+    let picked = picked.map(|Stacked { index, inks_of, inks }| {
+        // An ink may be listed at two depths.
+        let has = |bits: u16, slot: &Slot| {
+            inks.iter().zip(0..).any(|(ink, at)| *ink == slot.ink && bits >> at & 1 > 0)
+        };
+        let mask = |bits: u16| {
+            slots
+                .iter()
+                .enumerate()
+                .filter(|(_, slot)| has(bits, slot))
+                .fold(0, |mask, (at, _)| mask | 1 << at)
+        };
+        (index, inks_of.map(mask))
+    });
+    let census = match &picked {
+        Some((index, masks)) => {
+            let mut census = vec![0; 1 << slots.len()];
+            let counts: Vec<[u64; 256]> =
+                index.par_chunks(1 << 20).map(|dots| sheet::census([dots].into_iter())).collect();
+            for (count, &mask) in counts.iter().flat_map(|counts| counts.iter().zip(masks)) {
+                census[mask] += count;
+            }
+            census
+        }
+        None => pack::census(&planes, width, length),
+    };
     let mut stacks = vec![Stack::SUBSTRATE];
     let mut counts = vec![0u64];
     let mut stack_of = vec![0u16; census.len()];
@@ -300,8 +343,18 @@ fn stack_up(
         // More than 256 stacks are refused below.
         stack_of[mask] = number.min(256) as u16;
     }
-    // Every combination that occurs has an entry in the table, so unpacking always succeeds.
-    let index = pack::unpack(&planes, width, length, &stack_of).unwrap_or_default();
+    let index = match picked {
+        Some((mut index, masks)) => {
+            let number = masks.map(|mask: usize| stack_of[mask] as u8);
+            let renumber = |dots: &mut [u8]| dots.iter_mut().for_each(|dot| *dot = number[usize::from(*dot)]);
+            if number.iter().zip(0..).any(|(&number, old)| number != old) {
+                index.par_chunks_mut(1 << 16).for_each(renumber);
+            }
+            index
+        }
+        // Every combination that occurs has an entry in the table, so unpacking always succeeds.
+        None => pack::unpack(&planes, width, length, &stack_of).unwrap_or_default(),
+    };
     let dots = DotMap::new(width, length, stacks, index).map_err(no_sheet)?;
     let laid: Vec<Laid> = slots
         .iter()

@@ -67,65 +67,93 @@ fn strips<const N: usize>(
     table: &Table,
 ) -> Vec<u8> {
     let mut index = vec![0; width * height];
-    index.par_chunks_mut(width * strip).enumerate().for_each(|(number, out)| {
+    index.par_chunks_mut(width * strip).enumerate().for_each_init(Strip::default, |read, (number, out)| {
         let top = number * strip;
-        let strip = Strip::new(rows, (width, height), top..top + out.len() / width);
+        read.read(rows, (width, height), top..top + out.len() / width);
         wide(
             #[inline(always)]
-            || strip.pick(mixtures, table, out),
+            || read.pick(mixtures, table, out),
         );
     });
     index
 }
 
-/// The dots of a strip and those beyond it that decide about them.
+/// The dots of a strip and those beyond it that decide about them. It is read anew for the next, so that its memory is not fresh each time.
+#[derive(Default)]
 struct Strip {
     width: usize,
     /// The strip's own rows among those read.
     own: Range<usize>,
     /// The strip's first row on the page.
     top: usize,
-    /// The colours of the dots, row by row, with [`FLAT`].
+    /// The colours of the dots, row by row, and these with [`FLAT`].
+    plain: Vec<Key>,
     keys: Vec<Key>,
+    /// The colour of each row that has only one.
+    even: Vec<Option<Key>>,
 }
 
 impl Strip {
-    fn new(
+    fn read(
+        &mut self,
         read: &impl Fn(Range<usize>, &mut [Key]),
         (width, height): (usize, usize),
         rows: Range<usize>,
-    ) -> Strip {
+    ) {
         let all = rows.start.saturating_sub(HALO)..(rows.end + HALO).min(height);
-        let own = rows.start - all.start..rows.end - all.start;
-        let mut plain = vec![0; width * all.len()];
-        read(all, &mut plain);
-        let mut keys = plain.clone();
+        let Strip { plain, keys, even, .. } = self;
+        (self.width, self.top) = (width, rows.start);
+        self.own = rows.start - all.start..rows.end - all.start;
+        plain.resize(width * all.len(), 0);
+        read(all, plain);
+        keys.clear();
+        keys.extend_from_slice(plain);
         let last = plain.len() / width - 1;
+        even.resize(last + 1, None);
         wide(
             #[inline(always)]
             || {
+                for (even, row) in even.iter_mut().zip(plain.chunks_exact(width)) {
+                    *even = are_alike(row, row[0]).then_some(row[0]);
+                }
                 for (y, out) in keys.chunks_exact_mut(width).enumerate() {
                     let row = |y: usize| &plain[y * width..(y + 1) * width];
+                    // Half of a page of text are rows of paper amid paper.
+                    let is_amid = y > 0 && y < last && even[y - 1] == even[y] && even[y] == even[y + 1];
+                    if let (Some(key), true) = (even[y], is_amid && width > 2) {
+                        let mut mark = |range: Range<usize>, alike: u8| {
+                            out[range].iter_mut().for_each(|out| *out = marked(key, alike));
+                        };
+                        // The outermost have five neighbours.
+                        mark(0..1, ALL - 3);
+                        mark(1..width - 1, ALL);
+                        mark(width - 1..width, ALL - 3);
+                        continue;
+                    }
                     // Beyond the page there is nothing, so a border has its own colour outside only where it goes on.
                     let around = [(y > 0).then(|| row(y - 1)), Some(row(y)), (y < last).then(|| row(y + 1))];
                     mark_flat(out, around);
                 }
             },
         );
-        Strip { width, own, top: rows.start, keys }
     }
 
     #[inline(always)]
     fn pick<const N: usize>(&self, mixtures: &Mixtures<'_, N>, table: &Table, out: &mut [u8]) {
-        let mut leans = Leans::new(&self.keys, self.width);
+        let mut leans = Leans::new(&self.keys, &self.even, mixtures.rules.apart);
         let mut known = Known::new(mixtures);
         for (y, out) in self.own.clone().zip(out.chunks_exact_mut(self.width)) {
             let thresholds = table.row(self.top + y - self.own.start);
             let keys = &self.keys[y * self.width..(y + 1) * self.width];
+            if self.even[y].is_some_and(|key| mixtures.is_named(colour(key))) {
+                let stops = known.stops(keys[0]);
+                out.fill(mixtures.order[Mixtures::pick(&stops, 0)]);
+                continue;
+            }
             let mut at = (Key::MAX, [0; N]);
             for ((number, keys), out) in keys.chunks(BLOCK).enumerate().zip(out.chunks_mut(BLOCK)) {
                 if keys[0] != at.0 {
-                    at = (keys[0], *known.stops(keys[0]));
+                    at = (keys[0], known.stops(keys[0]));
                 }
                 let thresholds = &thresholds[number * BLOCK % SIDE..][..keys.len()];
                 // Most of a page is paper.
@@ -135,12 +163,12 @@ impl Strip {
                 }
                 for ((&key, &threshold), out) in keys.iter().zip(thresholds).zip(out) {
                     if key != at.0 {
-                        at = (key, *known.stops(key));
+                        at = (key, known.stops(key));
                     }
                     *out = mixtures.order[Mixtures::pick(&at.1, threshold)];
                 }
             }
-            for lean in leans.row(y) {
+            for lean in leans.row(y, |key| mixtures.is_named(colour(key))) {
                 let stops = known.leaning(lean);
                 out[lean.x] = mixtures.order[Mixtures::pick(&stops, thresholds[lean.x % SIDE])];
             }
@@ -148,15 +176,19 @@ impl Strip {
     }
 }
 
+/// A colour with marks for so many neighbours of that very colour.
+#[inline(always)]
+fn marked(key: Key, alike: u8) -> Key {
+    let flat = if alike >= ALIKE { FLAT } else { 0 };
+    key | flat | if alike == ALL && key & DRAWN == 0 { AREA } else { 0 }
+}
+
 /// Marks the flat ones among the dots of a row. `around` are the rows above, of these dots and below, without marks.
 #[inline(always)]
 fn mark_flat(out: &mut [Key], around: [Option<&[Key]>; 3]) {
     let width = out.len();
     let Some(own) = around[1] else { return };
-    let mark = |out: &mut Key, alike: u8| {
-        *out |= if alike >= ALIKE { FLAT } else { 0 };
-        *out |= if alike == ALL && *out & DRAWN == 0 { AREA } else { 0 };
-    };
+    let mark = |out: &mut Key, alike: u8| *out = marked(*out, alike);
     for start in (0..width).step_by(BLOCK) {
         let end = (start + BLOCK).min(width);
         let out = &mut out[start..end];
@@ -194,7 +226,7 @@ fn are_alike(keys: &[Key], own: Key) -> bool {
     keys.iter().fold(0, |other, key| other | (key ^ own)) == 0
 }
 
-/// The stops of the colours that were asked for last, by a hash.
+/// The stops of the flat colours that were asked for last, by a hash.
 struct Known<'a, const N: usize> {
     mixtures: &'a Mixtures<'a, N>,
     last: Vec<(Key, Stops<N>)>,
@@ -211,20 +243,27 @@ impl<'a, const N: usize> Known<'a, N> {
     }
 
     #[inline(always)]
-    fn stops(&mut self, key: Key) -> &Stops<N> {
+    fn stops(&mut self, key: Key) -> Stops<N> {
+        let drawn = key & DRAWN > 0;
+        // The step of a shading in a picture is no colour of its own.
+        let is_flat = key & if drawn { FLAT } else { AREA } > 0;
+        // A photograph's colours hardly ever return.
+        match is_flat || key & LABEL > 0 {
+            true => self.kept(key),
+            false => self.mixtures.stops(colour(key), drawn),
+        }
+    }
+
+    fn kept(&mut self, key: Key) -> Stops<N> {
         let known = &mut self.last[place(key)];
         if known.0 != key {
-            let drawn = key & DRAWN > 0;
-            // The step of a shading in a picture is no colour of its own.
-            let is_flat = key & if drawn { FLAT } else { AREA } > 0;
             let stops = match key & LABEL > 0 {
                 true => self.mixtures.label(colour(key)),
-                false if is_flat => self.mixtures.flat(colour(key), drawn),
-                false => self.mixtures.stops(colour(key), drawn),
+                false => self.mixtures.flat(colour(key), key & DRAWN > 0),
             };
             *known = (key, stops);
         }
-        &known.1
+        known.1
     }
 
     fn leaning(&mut self, lean: &lean::Lean) -> Stops<N> {
@@ -232,8 +271,8 @@ impl<'a, const N: usize> Known<'a, N> {
         let at = place(lean.own.rotate_left(7) ^ lean.other.rotate_left(1) ^ Key::from(lean.at_edge));
         if self.leaning[at].0 != key {
             // Beside an edge a colour of a picture is an area, too.
-            let (own, other) = (*self.stops(lean.own | AREA), *self.stops(lean.other | AREA));
-            self.leaning[at] = (key, lean::leaning(&own, &other, lean.at_edge));
+            let (own, other) = (self.stops(lean.own | AREA), self.stops(lean.other | AREA));
+            self.leaning[at] = (key, lean::leaning(&own, &other, lean.at_edge, self.mixtures.rules.part));
         }
         self.leaning[at].1
     }

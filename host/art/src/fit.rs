@@ -26,6 +26,8 @@ pub(super) struct Wishes {
     pub gamma: f64,
     /// Whether text or a drawing has any of the colours.
     pub has_drawings: bool,
+    /// Whether a picture has any.
+    pub has_pictures: bool,
 }
 
 /// The nodes of the lattices, fitted.
@@ -60,7 +62,10 @@ impl Fit {
         observer: &dyn Observer,
     ) -> Result<Fit, Diagnosis> {
         let intents: &[Intent] = match wishes.intent {
-            Intent::Auto if wishes.has_drawings => &[Intent::Perceptual, Intent::Colorimetric],
+            Intent::Auto if wishes.has_drawings && wishes.has_pictures => {
+                &[Intent::Perceptual, Intent::Colorimetric]
+            }
+            Intent::Auto if wishes.has_drawings => &[Intent::Colorimetric],
             Intent::Auto | Intent::Perceptual => &[Intent::Perceptual],
             Intent::Colorimetric => &[Intent::Colorimetric],
         };
@@ -76,7 +81,7 @@ impl Fit {
             mix = lattice.even(mix, 0, printable).map_err(unfitted)?;
         }
         let of_drawings = intents.len() - 1;
-        if of_drawings > 0 {
+        if wishes.intent == Intent::Auto && wishes.has_drawings {
             let light = |level: f64| f64::from(srgb::decode(level.powf(1.0 / wishes.gamma) as f32));
             mix =
                 with_tints(mix, of_drawings, near, light, |colour| solids.named(colour)).map_err(unfitted)?;
@@ -125,6 +130,9 @@ mod tests {
     use appearance::weights::ONE;
     use inks::{InkSet, Library};
     use observe::Silent;
+    use palette::convert::FromColorUnclamped;
+    use palette::white_point::D65;
+    use palette::{Lab, LinSrgb};
     use protocol::ink::Kind;
 
     fn fitted(wishes: &Wishes) -> (Fit, Printable) {
@@ -152,11 +160,12 @@ mod tests {
         (0..fit.stacks.len()).map(|stack| share(stack) / one).collect()
     }
 
-    const DRAWN: Wishes = Wishes { intent: Intent::Auto, gamma: 1.0, has_drawings: true };
+    const DRAWN: Wishes = Wishes { intent: Intent::Auto, gamma: 1.0, has_drawings: true, has_pictures: true };
 
     /// What is printed for each pixel of a picture, between black and paper in linear light.
     fn printed(pixels: &[[u8; 3]], intent: Intent) -> Vec<Light> {
-        let (fit, printable) = fitted(&Wishes { intent, gamma: 1.0, has_drawings: false });
+        let (fit, printable) =
+            fitted(&Wishes { intent, gamma: 1.0, has_drawings: false, has_pictures: true });
         let (bare, black) = ends(&printable, &Space::half_angle(SAMPLES));
         let row = |stack: &Stack| {
             printable.curves.row(printable.stacks.iter().position(|known| known == stack).unwrap())
@@ -185,7 +194,7 @@ mod tests {
             for (grey, light) in greys.iter().zip(printed(&greys, intent)) {
                 assert!((light[1] - linear(*grey)[1]).abs() < 0.02, "{grey:?} is printed as {light:?}");
             }
-            let (fit, _) = fitted(&Wishes { intent, gamma: 1.0, has_drawings: false });
+            let (fit, _) = fitted(&Wishes { intent, gamma: 1.0, has_drawings: false, has_pictures: true });
             let paper = fit.stacks.iter().position(|stack| stack.layers().is_empty()).unwrap();
             assert_eq!(shares(&fit, [255; 3], false)[paper], 1.0, "white has no ink");
         }
@@ -298,6 +307,26 @@ mod tests {
             assert!((of(name) - share).abs() < 0.005, "{name}: {} of {share}", of(name));
             assert!((of(name) + of(ground) - 1.0).abs() < 0.002, "{name}: {shares:?}");
         }
+    }
+
+    /// Tints change the hue of a pink by hardly more than an eye takes for the same.
+    #[test]
+    fn a_drawn_pink_looks_about_as_colorimetric_does() {
+        let lab = |wishes: &Wishes, is_drawn: bool| {
+            let (fit, printable) = fitted(wishes);
+            let space = Space::half_angle(SAMPLES);
+            let solids = Solids::new(&printable, &space);
+            let shares = shares(&fit, [255, 128, 128], is_drawn);
+            let parts = || fit.stacks.iter().map(|stack| solids.body(stack)).zip(&shares);
+            let [r, g, b] = std::array::from_fn(|c| parts().map(|(body, share)| share * body[c]).sum());
+            Lab::<D65, f64>::from_color_unclamped(LinSrgb::<f64>::new(r, g, b))
+        };
+        let drawn = lab(&DRAWN, true);
+        let exact = lab(&Wishes { intent: Intent::Colorimetric, ..DRAWN }, false);
+        let off = [drawn.l - exact.l, drawn.a - exact.a, drawn.b - exact.b];
+        let off = off.into_iter().map(|v| v * v).sum::<f64>().sqrt();
+        println!("{drawn:?} and {exact:?}: {off:.1}");
+        assert!(off <= 12.0, "{drawn:?} and {exact:?}: {off}");
     }
 
     /// It was 0.6 over the last sixteenth: a dark band at the end.

@@ -18,8 +18,17 @@ pub const DEVICE: &str = "bitrgbtags";
 /// Bytes of a pixel: its tag, red, green and blue.
 pub const BYTES: usize = 4;
 
-/// What Ghostscript makes of full K and nothing else in a picture, whose colours it converts with a profile.
-pub(super) const K_OF_PICTURES: [u8; 3] = [35, 31, 32];
+/// What Ghostscript makes of full inks and nothing else in a picture, whose colours it converts with a profile, and the colour that names
+/// them.
+pub(super) const INKS_OF_PICTURES: [([u8; 3], [u8; 3]); 7] = [
+    ([0, 174, 239], [0, 255, 255]),
+    ([236, 0, 140], [255, 0, 255]),
+    ([255, 242, 0], [255, 255, 0]),
+    ([46, 48, 146], [0, 0, 255]),
+    ([0, 166, 80], [0, 255, 0]),
+    ([237, 28, 36], [255, 0, 0]),
+    ([35, 31, 32], [0, 0, 0]),
+];
 
 /// What drew a pixel.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]

@@ -20,7 +20,7 @@ use super::decode::decode;
 use super::error::{io, wrong};
 use super::options::Options;
 use super::size::{self, Unstated};
-use super::{bitplane, kinds, resample, reserved, scans};
+use super::{bitplane, kinds, pixels, resample, reserved, scans};
 use pictures::resolution::Dpi;
 use sheet::Plane;
 
@@ -239,9 +239,13 @@ pub(super) fn opaque_artwork<const N: usize>(
     mut pixels: Vec<u8>,
     options: &Options,
 ) -> Artwork {
-    // Reserved colours may be nearly white.
     if !options.reserves() {
         scans::clean::<N>(pixels.as_chunks_mut().0);
+    } else if size.0 as usize <= dots.0 && size.1 as usize <= dots.1 && sides(size) != dots {
+        // Reserved colours may be nearly white. Coarser than dots, they have the edges of all flat art.
+        let coarse = pixels::Pixels { bytes: pixels, each: N, width: sides(size).0, height: sides(size).1 };
+        let size = (dots.0 as u32, dots.1 as u32);
+        return opaque_artwork::<{ kinds::BYTES }>(name, file, size, dots, coarse.at_dots(dots), options);
     }
     let drawn = plane_of::<N>(&pixels, size, dots, |p| p[N - 3..] != [255; 3]);
     let (mut layers, mut notes) = (Vec::new(), Vec::new());
@@ -260,6 +264,10 @@ pub(super) fn opaque_artwork<const N: usize>(
     }
     let colour = Colour::of_pixels::<N>(pixels, size);
     Artwork { layers, colour, drawn, notes, ..Artwork::blank(name, dots) }
+}
+
+fn sides(size: (u32, u32)) -> (usize, usize) {
+    (size.0 as usize, size.1 as usize)
 }
 
 /// Whether a picture has no more colours than a drawing, one of them not white.

@@ -9,14 +9,18 @@ use std::ops::Range;
 use std::sync::LazyLock;
 
 use super::edges::Edges;
-use super::key::{BLACK, DRAWN, Key, colour, key, of_drawn};
-use super::kinds::{BYTES, K_OF_PICTURES, ObjectType, split};
+use super::key::{DRAWN, Key, LABEL, colour, key, of_drawn};
+use super::kinds::{BYTES, INKS_OF_PICTURES, ObjectType, split};
 use super::resample;
 use appearance::srgb;
 use appearance::wide::wide;
+use rayon::prelude::*;
 
 /// Pixels that are looked at together: most of a page is paper.
 const BLOCK: usize = 32;
+
+/// Rows that are read at once.
+const STRIP: usize = 64;
 
 /// Writes the colours of rows of dots.
 pub(super) type Rows<'a> = dyn Fn(Range<usize>, &mut [Key]) + Sync + 'a;
@@ -40,6 +44,27 @@ impl Pixels {
         }
     }
 
+    /// The picture with a pixel for each dot, four bytes each.
+    pub fn at_dots(&self, dots: (usize, usize)) -> Vec<u8> {
+        let rows = self.rows(dots, true);
+        let mut out = vec![0; BYTES * dots.0 * dots.1];
+        out.par_chunks_mut(BYTES * dots.0 * STRIP).enumerate().for_each(|(number, out)| {
+            let pixels = out.as_chunks_mut::<BYTES>().0;
+            let (top, mut keys) = (number * STRIP, vec![0; pixels.len()]);
+            rows(top..top + pixels.len() / dots.0, &mut keys);
+            for (pixel, key) in pixels.iter_mut().zip(keys) {
+                let [r, g, b] = colour(key);
+                let tag = match () {
+                    () if key & LABEL > 0 => ObjectType::TEXT,
+                    () if key & DRAWN > 0 => ObjectType::DRAWING,
+                    () => ObjectType::PICTURE,
+                };
+                *pixel = [tag, r, g, b];
+            }
+        });
+        out
+    }
+
     fn rows_of<const N: usize>(&self, dots: (usize, usize), labels: bool) -> Box<Rows<'_>> {
         let (size, pixels) = ((self.width, self.height), self.bytes.as_chunks::<N>().0);
         // Pages with tags are drawn without soft edges, but for their pictures.
@@ -57,10 +82,15 @@ impl Pixels {
 
 #[inline(always)]
 fn key_of<const N: usize>(pixel: &[u8; N], labels: bool) -> Key {
-    match split(pixel) {
-        (ObjectType::Picture, K_OF_PICTURES) if N == BYTES => BLACK,
-        (kind, colour) => of_drawn(kind, colour, labels),
+    let (kind, colour) = split(pixel);
+    if N < BYTES || kind != ObjectType::Picture {
+        return of_drawn(kind, colour, labels);
     }
+    // All are compared, without a branch.
+    let own = key(colour, false);
+    INKS_OF_PICTURES
+        .iter()
+        .fold(own, |found, &(of, named)| if own == key(of, false) { key(named, false) } else { found })
 }
 
 fn row<const N: usize>(

@@ -14,6 +14,8 @@
 //! Source of the colours: the vendor's user's guide, English and Japanese editions.
 
 mod classes;
+#[cfg(test)]
+mod tests;
 
 use protocol::ink::{Ink, Kind};
 use rayon::prelude::*;
@@ -51,12 +53,23 @@ const TABLE: [Reserved; 6] = [
 /// The tolerance of a colour that the user names: that of the vendor's metals.
 const NAMED: u8 = 12;
 
-/// An ink that the picture has elsewhere is on at least so many pixels, and its red, green and blue differ by at least so much.
-const LEAST: u64 = 64;
-const COLOURED: u8 = 48;
+/// What decides about pixels that are not plainly of an ink. A test moves each of these by a fifth.
+#[derive(Clone, Copy, Debug)]
+struct Rules {
+    /// An ink that the picture has elsewhere is on at least so many pixels, and its red, green and blue differ by at least so much.
+    least: u64,
+    coloured: u8,
+    /// The largest difference that a file's depth and profile make to a pixel drawn in a reserved colour.
+    exact: u8,
+    /// The largest distance of an edge from the line between its colours, in 8-bit steps: rounding and gamma-blended edges need this much.
+    off: f64,
+    /// Sharpened edges may lie beyond an end of the line by this part of its length; Lanczos and bicubic filters stay below a tenth.
+    beyond: f64,
+}
 
-/// The largest difference that a file's depth and profile make to a pixel drawn in a reserved colour.
-const EXACT: u8 = 2;
+impl Rules {
+    const USUAL: Rules = Rules { least: 64, coloured: 48, exact: 2, off: 12.0, beyond: 0.125 };
+}
 
 /// The reserved colours of a picture.
 pub(super) struct Found {
@@ -103,8 +116,13 @@ impl Found {
 
 /// Takes the reserved colours out of a picture: their pixels become white, and layers at the dots.
 pub(super) fn take(rgb: &mut [u8], size: (u32, u32), dots: (usize, usize), options: &Options) -> Found {
+    take_by(Rules::USUAL, rgb, size, dots, options)
+}
+
+/// The same by these rules.
+fn take_by(rules: Rules, rgb: &mut [u8], size: (u32, u32), dots: (usize, usize), options: &Options) -> Found {
     let table = in_use(options);
-    let (classes, edges) = classify(rgb.as_chunks::<3>().0, size.0 as usize, &table);
+    let (classes, edges) = classify(rules, rgb.as_chunks::<3>().0, size.0 as usize, &table);
     let mut counts = vec![(0u64, 0u64); 1 + table.len()];
     for &(_, to) in edges.iter().filter(|(_, to)| *to != OTHER) {
         counts[usize::from(to)].1 += 1;
@@ -141,7 +159,12 @@ pub(super) fn take(rgb: &mut [u8], size: (u32, u32), dots: (usize, usize), optio
 }
 
 /// The class of every pixel, and the pixels whose class was that of an edge or accidental, with their new class.
-fn classify(pixels: &[[u8; 3]], width: usize, table: &[Reserved]) -> (Classes, Vec<(usize, u8)>) {
+fn classify(
+    rules: Rules,
+    pixels: &[[u8; 3]],
+    width: usize,
+    table: &[Reserved],
+) -> (Classes, Vec<(usize, u8)>) {
     let mut classes = Classes { of: by_colour(pixels, table), width };
     // No softened edge has exactly the colour of an ink pixel after pixel, unless that is grey: a thin line has.
     let is_exact = |class: u8, at: usize| {
@@ -163,7 +186,7 @@ fn classify(pixels: &[[u8; 3]], width: usize, table: &[Reserved]) -> (Classes, V
         let place = usize::from(class & !LOOSE);
         place.checked_sub(1).and_then(|at| table.get(at)).is_some_and(|entry| {
             entry.ink.kind() == Kind::Metallic
-                && (0..3).any(|c| entry.colour[c].abs_diff(pixels[at][c]) > EXACT)
+                && (0..3).any(|c| entry.colour[c].abs_diff(pixels[at][c]) > rules.exact)
                 && classes.is_alone(at)
         })
     };
@@ -171,14 +194,14 @@ fn classify(pixels: &[[u8; 3]], width: usize, table: &[Reserved]) -> (Classes, V
         classes.changes(
             |class| class >= LOOSE,
             |class, at| {
-                edge(pixels[at], classes.around(at), &colours)
+                edge(rules, pixels[at], classes.around(at), &colours)
                     .or_else(|| is_accidental(class, at, classes).then_some(OTHER))
             },
         )
     };
     let mut edges = edges_of(&classes);
     classes.apply(&edges);
-    let thin = thin_lines(pixels, &classes, &colours);
+    let thin = thin_lines(rules, pixels, &classes, &colours);
     classes.apply(&thin);
     if !thin.is_empty() {
         // Now their ink is near their own softened edges.
@@ -191,17 +214,17 @@ fn classify(pixels: &[[u8; 3]], width: usize, table: &[Reserved]) -> (Classes, V
 
 /// Lines so thin that no pixel has their colour: what is nowhere three pixels wide and is more than half an ink that the picture has elsewhere, on a
 /// colour near it. Greys and silver are no such inks: thin lines in grey are grey.
-fn thin_lines(pixels: &[[u8; 3]], classes: &Classes, colours: &[[u8; 3]]) -> Vec<(usize, u8)> {
+fn thin_lines(rules: Rules, pixels: &[[u8; 3]], classes: &Classes, colours: &[[u8; 3]]) -> Vec<(usize, u8)> {
     let mut counts = [0u64; 256];
     classes.of.iter().for_each(|&class| counts[usize::from(class & !LOOSE)] += 1);
-    let has_colour = |[r, g, b]: [u8; 3]| r.max(g).max(b) - r.min(g).min(b) >= COLOURED;
-    let is_known = |&class: &usize| counts[class] >= LEAST && has_colour(colours[class]);
+    let has_colour = |[r, g, b]: [u8; 3]| r.max(g).max(b) - r.min(g).min(b) >= rules.coloured;
+    let is_known = |&class: &usize| counts[class] >= rules.least && has_colour(colours[class]);
     let inks: Vec<usize> = (1..colours.len()).filter(is_known).collect();
     classes.changes(
         |class| class == OTHER,
         |_, at| {
             let near = classes.around(at);
-            let is_of = |&ink: &usize| edge(pixels[at], near | 1 << ink, colours) == Some(ink as u8);
+            let is_of = |&ink: &usize| edge(rules, pixels[at], near | 1 << ink, colours) == Some(ink as u8);
             let may_be = near != 0 && !classes.in_three(at);
             let ink = may_be.then(|| inks.iter().copied().filter(|ink| near & 1 << ink == 0).find(is_of));
             ink.flatten().map(|ink| ink as u8)
@@ -262,241 +285,25 @@ fn in_use(options: &Options) -> Vec<Reserved> {
 
 /// The class of an edge pixel: the nearer of two colours around it whose mixture it is; `None` if it is no such mixture.
 /// `seen` has a bit for each colour around the pixel.
-fn edge(pixel: [u8; 3], seen: u32, colours: &[[u8; 3]]) -> Option<u8> {
-    /// Largest squared distance from the line, in 8-bit steps: rounding and gamma-blended edges need this much.
-    const OFF: i64 = 12 * 12;
-    /// Sharpened edges may lie beyond an end of the line by its length divided by this; Lanczos and bicubic filters stay
-    /// below a tenth.
-    const BEYOND: i64 = 8;
+fn edge(rules: Rules, pixel: [u8; 3], seen: u32, colours: &[[u8; 3]]) -> Option<u8> {
     let vector =
-        |a: [u8; 3], b: [u8; 3]| -> [i64; 3] { std::array::from_fn(|c| i64::from(b[c]) - i64::from(a[c])) };
-    let dot = |a: [i64; 3], b: [i64; 3]| (0..3).map(|c| a[c] * b[c]).sum::<i64>();
-    let mut best: Option<(i64, u8)> = None;
+        |a: [u8; 3], b: [u8; 3]| -> [f64; 3] { std::array::from_fn(|c| f64::from(b[c]) - f64::from(a[c])) };
+    let dot = |a: [f64; 3], b: [f64; 3]| (0..3).map(|c| a[c] * b[c]).sum::<f64>();
+    let mut best: Option<(f64, u8)> = None;
     for a in (0..colours.len()).filter(|a| seen & 1 << a != 0) {
         for b in (a + 1..colours.len()).filter(|b| seen & 1 << b != 0) {
             let (along, to) = (vector(colours[a], colours[b]), vector(colours[a], pixel));
             let (length, at) = (dot(along, along), dot(along, to));
-            if at < -length / BEYOND || at > length + length / BEYOND {
+            if at < -length * rules.beyond || at > length * (1.0 + rules.beyond) {
                 continue;
             }
-            // The squared distance from the line, |to|^2 - at^2 / length.
+            // The squared distance from the line.
             let off = dot(to, to) - at * at / length;
-            let nearer = if 2 * at < length { a } else { b } as u8;
-            if off <= OFF && best.is_none_or(|(least, _)| off < least) {
+            let nearer = if 2.0 * at < length { a } else { b } as u8;
+            if off <= rules.off * rules.off && best.is_none_or(|(least, _)| off < least) {
                 best = Some((off, nearer));
             }
         }
     }
     best.map(|(_, class)| class)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A disc of one colour on another, softened over a pixel as drawing programs do.
-    fn soft_disc(side: usize, colour: [u8; 3], ground: [u8; 3]) -> Vec<u8> {
-        let middle = side as f64 / 2.0;
-        (0..side * side)
-            .flat_map(|at| {
-                let (x, y) = ((at % side) as f64 + 0.5 - middle, (at / side) as f64 + 0.5 - middle);
-                let inside = (side as f64 / 3.0 - x.hypot(y) + 0.5).clamp(0.0, 1.0);
-                std::array::from_fn::<u8, 3, _>(|c| {
-                    (inside * f64::from(colour[c]) + (1.0 - inside) * f64::from(ground[c])).round() as u8
-                })
-            })
-            .collect()
-    }
-
-    fn plane(layer: &Layer) -> u64 {
-        match &layer.shape {
-            Shape::Solid(plane) => plane.dots(),
-            Shape::Tone(_) => panic!("reserved colours have no tones"),
-        }
-    }
-
-    #[test]
-    fn colours_that_the_user_names_are_inks_and_several_of_one_ink_one_layer() {
-        let side = 60;
-        let mut pixels = soft_disc(side, [255, 0, 0], [255; 3]);
-        // A bar of the other colour of the same ink, one of another ink, and one of the vendor's gold, which nobody asked for.
-        for (y, colour) in [(2, [200, 0, 200]), (54, [0, 128, 0]), (58, [225, 160, 0])] {
-            for at in y * side..(y + 2) * side {
-                pixels[3 * at..3 * at + 3].copy_from_slice(&colour);
-            }
-        }
-        let colours = vec![
-            (Ink::MetallicGold, [255, 0, 0]),
-            (Ink::White, [4, 124, 3]),
-            (Ink::MetallicGold, [200, 0, 200]),
-        ];
-        let options = Options { colours, ..Options::default() };
-        let size = (side as u32, side as u32);
-        let found = take(&mut pixels, size, (side, side), &options);
-        let inks: Vec<Ink> = found.layers.iter().map(|layer| layer.ink).collect();
-        assert_eq!(inks, [Ink::MetallicGold, Ink::White]);
-        let disc = std::f64::consts::PI * 20.0 * 20.0 + 120.0;
-        let gold = plane(&found.layers[0]) as f64;
-        assert!((gold - disc).abs() < 0.02 * disc, "{gold} dots of {disc}, soft edges included");
-        assert_eq!(plane(&found.layers[1]), 120, "within the tolerance");
-        let plain = pixels.as_chunks::<3>().0.iter().filter(|pixel| **pixel != [255; 3]).count();
-        assert_eq!(plain, 120, "the vendor's gold is a plain colour here");
-        let narrow = Options { tolerance: Some(0), ..options };
-        let found = take(&mut [4, 125, 3].repeat(side * side), size, (side, side), &narrow);
-        assert!(found.layers.is_empty());
-    }
-
-    #[test]
-    fn softened_edges_leave_no_fringe_of_colour() {
-        let side = 300;
-        let area = std::f64::consts::PI * 100.0 * 100.0;
-        for (at, entry) in TABLE.iter().enumerate() {
-            for ground in [[255; 3], TABLE[(at + 1) % TABLE.len()].colour] {
-                let mut rgb = soft_disc(side, entry.colour, ground);
-                let found = take(
-                    &mut rgb,
-                    (300, 300),
-                    (side, side),
-                    &Options { reserved: true, ..Options::default() },
-                );
-                assert!(rgb.iter().all(|&v| v == 255), "{:?} on {ground:?} leaves colour", entry.ink);
-                assert!(
-                    found.layers.iter().all(|layer| layer.ink == entry.ink || ground != [255; 3]),
-                    "an edge of {:?} on paper calls for another ink",
-                    entry.ink
-                );
-                assert!(found.layers.len() <= 2, "{:?} on {ground:?} calls for a third ink", entry.ink);
-                let layer = found.layers.iter().find(|layer| layer.ink == entry.ink).unwrap();
-                let off = (plane(layer) as f64 - area).abs() / area;
-                assert!(off < 0.005, "{:?}: {} dots, the disc has {area:.0}", entry.ink, plane(layer));
-            }
-        }
-    }
-
-    #[test]
-    fn sharpened_edges_leave_no_fringe_of_colour_either() {
-        // A black bar on the white, resampled with a filter that rings, as image programs do.
-        let (white, bar) = ([230; 3], 180..300);
-        let large = image::RgbImage::from_fn(480, 480, |x, y| {
-            image::Rgb(if bar.contains(&x) && (90..390).contains(&y) { [0; 3] } else { white })
-        });
-        for filter in [image::imageops::FilterType::Lanczos3, image::imageops::FilterType::CatmullRom] {
-            // 7 to 3: edges fall between pixels.
-            let small = image::imageops::resize(&large, 206, 206, filter);
-            assert!(small.pixels().any(|pixel| pixel.0[0] > 235), "the filter rings");
-            let mut rgb = small.into_raw();
-            let found =
-                take(&mut rgb, (206, 206), (206, 206), &Options { reserved: true, ..Options::default() });
-            assert!(rgb.iter().all(|&v| v == 255), "{filter:?} leaves colour");
-            let inks: Vec<Ink> = found.layers.iter().map(|layer| layer.ink).collect();
-            assert_eq!(inks, [Ink::White, Ink::Black], "{filter:?}");
-            let wanted = (120.0 * 300.0) * (206.0f64 / 480.0).powi(2);
-            assert!((plane(&found.layers[1]) as f64 - wanted).abs() < 0.02 * wanted);
-        }
-    }
-
-    #[test]
-    fn a_lone_pixel_of_metal_beside_colours_is_a_colour_and_a_line_of_it_is_metal() {
-        // Within the tolerance, not exact.
-        let silver = [197, 197, 197];
-        let green = [40, 160, 60];
-        let picture = |is_silver: &dyn Fn(usize, usize) -> bool| -> Vec<u8> {
-            (0..400).flat_map(|at| if is_silver(at % 20, at / 20) { silver } else { green }).collect()
-        };
-        let two = |x, y| (x, y) == (9, 9) || (x, y) == (10, 10);
-        let mut rgb = picture(&two);
-        let found = take(&mut rgb, (20, 20), (20, 20), &Options { reserved: true, ..Options::default() });
-        assert!(found.layers.is_empty() && rgb == picture(&two));
-        let mut rgb = picture(&|x, y| y == 9 && x > 3);
-        let found = take(&mut rgb, (20, 20), (20, 20), &Options { reserved: true, ..Options::default() });
-        assert_eq!((found.layers[0].ink, plane(&found.layers[0])), (Ink::MetallicSilver, 16));
-    }
-
-    /// A line of which one pixel is covered wholly and those beside it in part, on black and on paper; no pixel of it lies in a square.
-    #[test]
-    fn a_thin_line_is_of_its_ink_with_its_softened_edges() {
-        let gold = [225, 160, 0];
-        for ground in [[0u8; 3], [255; 3]] {
-            for shares in
-                [[0.25, 1.0, 0.75], [0.0, 1.0, 0.5], [0.4, 1.0, 0.6], [0.0, 0.75, 0.6], [0.0, 0.8, 0.2]]
-            {
-                let pixel = |at: usize| -> [u8; 3] {
-                    // And a square of it elsewhere.
-                    if at % 40 < 9 && at / 40 < 9 {
-                        return gold;
-                    }
-                    let share = (at % 40).checked_sub(19).and_then(|x| shares.get(x)).copied().unwrap_or(0.0);
-                    std::array::from_fn(|c| {
-                        (share * f64::from(gold[c]) + (1.0 - share) * f64::from(ground[c])).round() as u8
-                    })
-                };
-                let mut rgb: Vec<u8> = (0..40 * 40).flat_map(pixel).collect();
-                let found =
-                    take(&mut rgb, (40, 40), (40, 40), &Options { reserved: true, ..Options::default() });
-                let of_gold = found.layers.iter().find(|layer| layer.ink == Ink::MetallicGold).map(plane);
-                let wide = shares.iter().filter(|&&share| share > 0.5).count() as u64;
-                let half = shares.iter().filter(|&&share| share == 0.5).count() as u64;
-                assert!(
-                    of_gold.is_some_and(|dots| (81 + 40 * wide..=81 + 40 * (wide + half)).contains(&dots)),
-                    "{of_gold:?} for {shares:?} on {ground:?}"
-                );
-                assert!(rgb.iter().all(|&v| v == 255), "{shares:?} on {ground:?}: process colours are left");
-            }
-        }
-    }
-
-    /// Lines a pixel wide beside squares of every ink: greys and pale colours stay what they are.
-    #[test]
-    fn thin_lines_in_grey_and_in_pale_colours_are_colour() {
-        let squares = TABLE.map(|entry| entry.colour);
-        for line in [[90; 3], [128; 3], [170; 3], [210; 3], [220, 221, 222], [250, 240, 214], [200, 226, 231]]
-        {
-            let pixel = |at: usize| match (at % 80, at / 80) {
-                (60, _) => line,
-                (x @ ..54, 2..13) if x % 9 < 8 => squares[x / 9],
-                _ => [255; 3],
-            };
-            let mut rgb: Vec<u8> = (0..80 * 40).flat_map(pixel).collect();
-            take(&mut rgb, (80, 40), (80, 40), &Options { reserved: true, ..Options::default() });
-            let kept = (0..40).filter(|y| rgb[3 * (80 * y + 60)..][..3] == line).count();
-            assert_eq!(kept, 40, "{line:?}");
-        }
-    }
-
-    #[test]
-    fn a_stray_grey_calls_for_silver_only_if_silver_is_at_hand() {
-        let grey = [189, 193, 197].repeat(100);
-        let with = |inks: &str| Options { reserved: true, inks: inks.parse().unwrap(), ..Options::default() };
-        let mut rgb = grey.clone();
-        let found = take(&mut rgb, (10, 10), (10, 10), &with("white,metallic-gold,process"));
-        assert!(found.layers.is_empty() && rgb == grey);
-        assert!(found.notes("art").iter().any(|note| note.contains("metallic-silver")));
-        let found = take(&mut rgb, (10, 10), (10, 10), &with("metallic-silver"));
-        assert_eq!(found.layers.iter().map(|layer| layer.ink).collect::<Vec<_>>(), [Ink::MetallicSilver]);
-        assert!(rgb.iter().all(|&v| v == 255));
-    }
-
-    #[test]
-    fn colours_within_the_tolerance_are_the_ink_and_others_are_not() {
-        let (gold, off) = ([225, 160, 0], [225, 173, 0]);
-        for (tolerance, wanted) in [(None, 1), (Some(13), 2), (Some(0), 1)] {
-            let mut rgb = [gold, off].concat();
-            let options = Options { reserved: true, tolerance, ..Options::default() };
-            let found = take(&mut rgb, (2, 1), (2, 1), &options);
-            assert_eq!(plane(&found.layers[0]), wanted, "tolerance {tolerance:?}");
-        }
-    }
-
-    #[test]
-    fn tolerances_of_the_table_do_not_overlap() {
-        for (i, a) in TABLE.iter().enumerate() {
-            for b in &TABLE[..i] {
-                let apart = (0..3).any(|c| {
-                    u16::from(a.colour[c].abs_diff(b.colour[c]))
-                        > u16::from(a.tolerance) + u16::from(b.tolerance)
-                });
-                assert!(apart, "{:?} and {:?}", a.ink, b.ink);
-            }
-        }
-    }
 }

@@ -2,18 +2,42 @@
 //!
 //! Problem: text is cut where it is softened between white and black, but noise leaves hardly a pixel of either, and all of it
 //! would be screened as a photograph.
-//! Method: a page is one of black on white if half of its pictures is nearly white, most of the rest nearly black or beside it, and what is
-//! nearly white changes from pixel to pixel as noise does; a flat tint does not. Nearly white is white there, and nearly black
-//! black.
-//! Cost: 1 ns a pixel, twice on such a page. Limits: text in colour keeps its noise, and tints lighter than [`PAPER`] vanish with it.
+//! Method: a page is a scan if half of its pictures is nearly white and what is nearly white changes from pixel to pixel as noise does; a
+//! flat tint does not. If most of the rest is nearly black or beside it, it is black on white: nearly white is white there, and nearly
+//! black black. Otherwise nearly white is white if noise is half of the page and hardly differs from white: that is paper, and no sky.
+//! Cost: 1 ns a pixel, twice on such a page. Limits: text in colour keeps its own noise, and tints lighter than [`Rules::paper`] vanish with
+//! that of paper.
 
 use rayon::prelude::*;
 
 use super::kinds::{ObjectType, split};
+use appearance::wide::wide;
 
-/// Paper with noise has at least so much in each of red, green and blue, and ink at most so much.
-const PAPER: u8 = 225;
-const INK: u8 = 48;
+/// What is nearly white and nearly black. A test moves each of these by a fifth.
+#[derive(Clone, Copy, Debug)]
+struct Rules {
+    /// Paper with noise has at least so much in each of red, green and blue, and ink at most so much.
+    paper: u8,
+    ink: u8,
+    /// The paper of a scan in colour nearly always has at least so much.
+    bright: u8,
+}
+
+impl Rules {
+    const USUAL: Rules = Rules { paper: 225, ink: 48, bright: 243 };
+
+    /// White or black, if a colour is nearly one of them.
+    #[inline(always)]
+    fn plain(self, colour: [u8; 3]) -> [u8; 3] {
+        if colour.iter().all(|&v| v >= self.paper) {
+            [255; 3]
+        } else if colour.iter().all(|&v| v <= self.ink) {
+            [0; 3]
+        } else {
+            colour
+        }
+    }
+}
 
 /// Pixels of pictures.
 #[derive(Clone, Copy, Default)]
@@ -22,16 +46,35 @@ struct Counts {
     /// Nearly white, but not white, amid paper, as the soft edge of a letter is not; and how many of these differ from the pixel before.
     noise: usize,
     changes: usize,
+    /// How many of it are hardly darker than white.
+    bright: usize,
     ink: usize,
     others: usize,
 }
 
+/// How many pixels are nearly white paper, and how many are of pictures.
+fn paper<const N: usize>(rules: Rules, pixels: &[[u8; N]]) -> (u64, u64) {
+    let (mut paper, mut pictures) = (0u32, 0u32);
+    wide(
+        #[inline(always)]
+        || {
+            for pixel in pixels {
+                let (kind, [r, g, b]) = split(pixel);
+                let is_picture = kind == ObjectType::Picture;
+                pictures += u32::from(is_picture);
+                paper += u32::from(is_picture & (r.min(g).min(b) >= rules.paper));
+            }
+        },
+    );
+    (paper.into(), pictures.into())
+}
+
 impl Counts {
-    fn of<const N: usize>(pixels: &[[u8; N]]) -> Counts {
+    fn of<const N: usize>(rules: Rules, pixels: &[[u8; N]]) -> Counts {
         let mut counts = Counts::default();
         let is_paper = |pixel: Option<&[u8; N]>| {
             pixel.is_none_or(|pixel| {
-                split(pixel).0 != ObjectType::Picture || plain(split(pixel).1) == [255; 3]
+                split(pixel).0 != ObjectType::Picture || rules.plain(split(pixel).1) == [255; 3]
             })
         };
         for (at, pixel) in pixels.iter().enumerate() {
@@ -39,13 +82,17 @@ impl Counts {
             if kind != ObjectType::Picture {
                 continue;
             }
-            match plain(colour) {
+            if colour == [255; 3] {
+                counts.paper += 1;
+                continue;
+            }
+            match rules.plain(colour) {
                 [255, 255, 255] => {
                     let before = at.checked_sub(1).and_then(|at| pixels.get(at));
-                    let noise =
-                        usize::from(colour != [255; 3] && is_paper(before) && is_paper(pixels.get(at + 1)));
+                    let noise = usize::from(is_paper(before) && is_paper(pixels.get(at + 1)));
                     counts.paper += 1;
                     counts.noise += noise;
+                    counts.bright += noise & usize::from(colour.iter().all(|&v| v >= rules.bright));
                     counts.changes += noise & usize::from(before.is_none_or(|before| before != pixel));
                 }
                 [0, 0, 0] => counts.ink += 1,
@@ -60,41 +107,56 @@ impl Counts {
             paper: self.paper + other.paper,
             noise: self.noise + other.noise,
             changes: self.changes + other.changes,
+            bright: self.bright + other.bright,
             ink: self.ink + other.ink,
             others: self.others + other.others,
         }
     }
 
-    fn is_black_on_white(&self) -> bool {
-        // Of a page that was enlarged four times, one pixel in four differs from that before.
-        self.paper > self.ink + self.others && self.others <= 3 * self.ink && 6 * self.changes > self.noise
+    /// Of a page that was enlarged four times, one pixel in four differs from that before.
+    fn has_noise(&self) -> bool {
+        6 * self.changes > self.noise
     }
-}
 
-/// White or black, if a colour is nearly one of them.
-fn plain(colour: [u8; 3]) -> [u8; 3] {
-    if colour.iter().all(|&v| v >= PAPER) {
-        [255; 3]
-    } else if colour.iter().all(|&v| v <= INK) {
-        [0; 3]
-    } else {
-        colour
+    fn is_black_on_white(&self) -> bool {
+        self.paper > self.ink + self.others && self.others <= 3 * self.ink && self.has_noise()
+    }
+
+    /// Whether it is paper with something in colour on it.
+    fn is_on_paper(&self) -> bool {
+        let all = self.paper + self.ink + self.others;
+        2 * self.noise > all && 20 * self.bright >= 19 * self.noise && self.has_noise()
     }
 }
 
 /// Takes the noise from pixels if they are such a page; returns whether they are.
 pub(super) fn clean<const N: usize>(pixels: &mut [[u8; N]]) -> bool {
-    let counts = pixels.par_chunks(1 << 16).map(Counts::of).reduce(Counts::default, Counts::and);
-    let clean = |pixel: &mut [u8; N]| {
-        let (kind, colour) = split(pixel);
-        if kind == ObjectType::Picture {
-            pixel[N - 3..].copy_from_slice(&plain(colour));
-        }
-    };
-    if counts.is_black_on_white() {
-        pixels.par_iter_mut().for_each(clean);
+    clean_by(Rules::USUAL, pixels)
+}
+
+/// The same by these rules.
+fn clean_by<const N: usize>(rules: Rules, pixels: &mut [[u8; N]]) -> bool {
+    let both = |a: (u64, u64), b: (u64, u64)| (a.0 + b.0, a.1 + b.1);
+    // Most of a photograph is no paper.
+    let (paper, pictures) =
+        pixels.par_chunks(1 << 16).map(|pixels| paper(rules, pixels)).reduce(|| (0, 0), both);
+    if 2 * paper <= pictures {
+        return false;
     }
-    counts.is_black_on_white()
+    let parts = pixels.par_chunks(1 << 16).map(|pixels| Counts::of(rules, pixels));
+    let counts = parts.reduce(Counts::default, Counts::and);
+    let is_black = counts.is_black_on_white();
+    if !is_black && !counts.is_on_paper() {
+        return false;
+    }
+    pixels.par_iter_mut().for_each(|pixel| {
+        let (kind, colour) = split(pixel);
+        let plain = rules.plain(colour);
+        if kind == ObjectType::Picture && (is_black || plain == [255; 3]) {
+            pixel[N - 3..].copy_from_slice(&plain);
+        }
+    });
+    true
 }
 
 #[cfg(test)]
@@ -134,20 +196,62 @@ mod tests {
         out.as_chunks::<3>().0.to_vec()
     }
 
+    /// The usual rules, and each of them a fifth farther from or nearer to white or black.
+    fn moved() -> Vec<Rules> {
+        let usual = Rules::USUAL;
+        let from_white = |v: u8, fifths: u8| 255 - ((255 - v) * fifths).div_ceil(5);
+        let moved = [4, 6].map(|fifths| {
+            [
+                Rules { paper: from_white(usual.paper, fifths), ..usual },
+                Rules { ink: usual.ink / 5 * fifths, ..usual },
+                Rules { bright: from_white(usual.bright, fifths), ..usual },
+            ]
+        });
+        [&[usual], moved.as_flattened()].concat()
+    }
+
     #[test]
     fn black_strokes_through_jpeg_are_cut_where_they_cover_half_a_pixel() {
-        let mut pixels = through_jpeg([0; 3], [255; 3]);
-        let exact = pixels.iter().filter(|pixel| **pixel == [255; 3] || **pixel == [0; 3]).count();
-        assert!(exact < pixels.len() * 3 / 4, "there is noise: {exact}");
-        assert!(clean(&mut pixels));
-        let size = (SIDE as u32, SIDE as u32);
-        let colour = Colour::of_pixels::<3>(pixels.concat(), size).unwrap();
-        let keys = colour.keys((SIDE, SIDE));
-        let wrong = (0..SIDE * SIDE)
-            .filter(|&at| (covered(at) - 0.5).abs() > 0.25)
-            .filter(|&at| keys[at] != if covered(at) > 0.5 { BLACK } else { WHITE })
-            .count();
-        assert_eq!(wrong, 0);
+        for rules in moved() {
+            let mut pixels = through_jpeg([0; 3], [255; 3]);
+            let exact = pixels.iter().filter(|pixel| **pixel == [255; 3] || **pixel == [0; 3]).count();
+            assert!(exact < pixels.len() * 3 / 4, "there is noise: {exact}");
+            assert!(clean_by(rules, &mut pixels));
+            let size = (SIDE as u32, SIDE as u32);
+            let colour = Colour::of_pixels::<3>(pixels.concat(), size).unwrap();
+            let keys = colour.keys((SIDE, SIDE));
+            let wrong = (0..SIDE * SIDE)
+                .filter(|&at| (covered(at) - 0.5).abs() > 0.25)
+                .filter(|&at| keys[at] != if covered(at) > 0.5 { BLACK } else { WHITE })
+                .count();
+            assert_eq!(wrong, 0);
+        }
+    }
+
+    /// Text in orange and blue on paper with noise, as a scanner sees it.
+    #[test]
+    fn coloured_strokes_on_noisy_paper_keep_their_colours_and_have_no_specks() {
+        let inks = [[230.0, 126.0, 34.0], [40.0, 70.0, 140.0]];
+        let noise =
+            |at: usize| (0..6).map(|n| ((at * 6 + n) as u32).wrapping_mul(0x9e37_79b1) >> 29).sum::<u32>();
+        let page: Vec<[u8; 3]> = (0..SIDE * SIDE)
+            .map(|at| {
+                let (ink, share) = (inks[at / SIDE / 60 % 2], covered(at));
+                let off = f64::from(noise(at)) - 21.0;
+                ink.map(|v| (v * share + 252.0 * (1.0 - share) + off / 2.0) as u8)
+            })
+            .collect();
+        for rules in moved() {
+            let mut pixels = page.clone();
+            assert!(clean_by(rules, &mut pixels), "{rules:?}");
+            for (at, (pixel, before)) in pixels.iter().zip(&page).enumerate() {
+                match covered(at) {
+                    0.0 => assert_eq!(*pixel, [255; 3], "{rules:?}: {before:?}"),
+                    0.5.. => assert_eq!(pixel, before, "{rules:?}"),
+                    _ => {}
+                }
+            }
+        }
     }
 
     /// A page of text with softened letters and a panel in a pale tint, as a browser draws it.

@@ -412,7 +412,14 @@ fn a_mask_of_one_colour_is_exact_on_pages_and_in_pictures() {
         MODULES.1,
         rows.collect::<String>()
     );
-    for colour in ["0 0 0 1 setcmykcolor", "0 0 1 setrgbcolor", "1 1 0 setrgbcolor"] {
+    let colours = [
+        "0 0 0 1 setcmykcolor",
+        "1 0 0 0 setcmykcolor",
+        "0 1 1 0 setcmykcolor",
+        "0 0 1 setrgbcolor",
+        "1 1 0 setrgbcolor",
+    ];
+    for colour in colours {
         let (wide, high) = (drawn.width, drawn.length());
         let drawing = format!("{colour} .12 .12 scale 300 700 translate {wide} {high} scale {mask}");
         std::fs::write(bench.path("mask.ps"), page((288.0, 216.0), &drawing)).expect("a page");

@@ -1,10 +1,12 @@
-//! What does not matter to dots: how blocks are looked at, and a fifth of each rule of edges.
+//! What does not matter to dots: how blocks are looked at, and a fifth of each rule of edges and of mixtures.
 
 use std::collections::HashSet;
 
-use super::super::edges::{Edges, Rules};
+use super::super::edges::{self, Edges};
 use super::super::key::key;
-use super::figures::{SIDE as ART, softened, text};
+use super::super::kinds::ObjectType;
+use super::figures::{GREY, SIDE as ART, SIZES, figure_by, map, softened, text};
+use super::mixtures::Rules;
 use super::tests::{Art, INKS, stack};
 use super::*;
 use halftone::green_noise::USUAL;
@@ -20,7 +22,10 @@ proptest! {
         let plain: Vec<Key> =
             (0..width * height).map(|at| key([if random(at) % rare == 0 { 9 } else { 200 }; 3], random(at) & 64 > 0 && rare < 50)).collect();
         let rows = |rows: Range<usize>, out: &mut [Key]| out.copy_from_slice(&plain[width * rows.start..width * rows.end]);
-        let strip = Strip::new(&rows, (width, height), 0..height);
+        let mut strip = Strip::default();
+        // What was read before does not matter.
+        strip.read(&rows, (width, height), 0..height.div_ceil(2));
+        strip.read(&rows, (width, height), 0..height);
         for at in 0..width * height {
             let (x, y) = (at % width, at / width);
             let near = (y.saturating_sub(1)..(y + 2).min(height)).flat_map(|v| (x.saturating_sub(1)..(x + 2).min(width)).map(move |u| (u, v)));
@@ -32,19 +37,19 @@ proptest! {
 }
 
 /// Each rule of edges by itself, a fifth less and more.
-fn moved() -> Vec<(String, Rules)> {
-    let Rules { tone, off, far_mm, area, stroke } = Rules::USUAL;
-    let usual = Rules::USUAL;
+fn moved() -> Vec<(String, edges::Rules)> {
+    let edges::Rules { tone, off, far_mm, area, stroke } = edges::Rules::USUAL;
+    let usual = edges::Rules::USUAL;
     [0.8, 1.2]
         .into_iter()
         .flat_map(|by| {
             let times = |v: f64| v * by;
             [
-                ("tone", Rules { tone: times(tone.into()).round() as u8, ..usual }),
-                ("off", Rules { off: times(off.into()) as f32, ..usual }),
-                ("far", Rules { far_mm: times(far_mm), ..usual }),
-                ("area", Rules { area: times(area as f64).round() as usize, ..usual }),
-                ("stroke", Rules { stroke: times(stroke.into()) as f32, ..usual }),
+                ("tone", edges::Rules { tone: times(tone.into()).round() as u8, ..usual }),
+                ("off", edges::Rules { off: times(off.into()) as f32, ..usual }),
+                ("far", edges::Rules { far_mm: times(far_mm), ..usual }),
+                ("area", edges::Rules { area: times(area as f64).round() as usize, ..usual }),
+                ("stroke", edges::Rules { stroke: times(stroke.into()) as f32, ..usual }),
             ]
             .map(|(name, rules)| (format!("{by} {name}"), rules))
         })
@@ -52,7 +57,7 @@ fn moved() -> Vec<(String, Rules)> {
 }
 
 /// The dots of art in pixels of so many dots, by these rules.
-fn by(rules: Rules, art: &Art, coarse: usize) -> Vec<u8> {
+fn by(rules: edges::Rules, art: &Art, coarse: usize) -> Vec<u8> {
     let soft = softened(art, coarse);
     let pixel = |x: usize, y: usize| key(soft.rgb[y * soft.width + x], false);
     let edges = Edges::by(rules, pixel, (soft.width, soft.height), (ART, ART));
@@ -78,4 +83,35 @@ fn a_fifth_of_a_rule_hardly_matters_to_soft_text() {
         }
     }
     assert_eq!(names.len(), 10);
+}
+
+/// An eye sees the same by rules of which one is a fifth less or more.
+#[test]
+fn a_fifth_of_a_rule_of_mixtures_hardly_changes_what_an_eye_sees() {
+    let Rules { least, apart, part } = Rules::USUAL;
+    let usual = Rules::USUAL;
+    let moved = [4, 6].map(|fifths| {
+        [
+            Rules { least: (u32::from(least) * fifths / 5) as u16, ..usual },
+            Rules { apart: apart * fifths / 5, ..usual },
+            Rules { part: part * fifths / 5, ..usual },
+        ]
+    });
+    let art = [
+        ("grey text", text(&SIZES, GREY, [255; 3]), 1.0),
+        ("navy text on a tint", text(&SIZES, [26, 79, 139], [225, 235, 245]), 2.5),
+        ("map", map(), 1.5),
+    ];
+    for (name, art, most) in art {
+        let before = figure_by(usual, &art, ObjectType::Drawing, 1);
+        for rules in moved.as_flattened() {
+            let found = figure_by(*rules, &art, ObjectType::Drawing, 1);
+            let Rules { least, apart, part } = rules;
+            println!("{name}, {least} {apart} {part}: {found:.3}, not {before:.3}");
+            assert!(
+                found <= most && (found - before).abs() < 0.15,
+                "{name}, {least} {apart} {part}: {found}, not {before}"
+            );
+        }
+    }
 }

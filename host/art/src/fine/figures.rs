@@ -8,12 +8,11 @@
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
+use super::super::intent::Light;
 use super::super::kinds::ObjectType;
-use super::mixtures::shares;
+use super::mixtures::{Rules, shares};
 use super::tests::{Art, INKS, stack};
 use super::*;
-
-type Light = [f64; 3];
 
 /// Dots along each side of the art, 22 mm.
 pub(super) const SIDE: usize = 512;
@@ -115,8 +114,13 @@ fn asked(art: &Art, kind: ObjectType) -> Vec<Light> {
 
 /// The mean difference at .3 m between art at the dots and what is printed of it when it is read in pixels of `coarse` dots.
 fn figure(art: &Art, kind: ObjectType, coarse: usize) -> f64 {
+    figure_by(Rules::USUAL, art, kind, coarse)
+}
+
+/// The same by these rules.
+pub(super) fn figure_by(rules: Rules, art: &Art, kind: ObjectType, coarse: usize) -> f64 {
     let bodies = bodies();
-    let dots = softened(art, coarse).dots(kind, (art.width, art.height));
+    let dots = softened(art, coarse).dots_by(rules, kind, (art.width, art.height));
     let printed: Vec<Light> = dots.iter().map(|&dot| bodies[usize::from(dot)]).collect();
     let (asked, printed) = (seen(&asked(art, kind), 0.3), seen(&printed, 0.3));
     asked.iter().zip(&printed).map(|(&a, &b)| difference(a, b)).sum::<f64>() / asked.len() as f64
@@ -192,7 +196,7 @@ pub(super) fn text(sizes: &[f64], ink: [u8; 3], ground: [u8; 3]) -> Art {
     art
 }
 
-const SIZES: [f64; 5] = [5.0, 6.0, 8.0, 10.0, 14.0];
+pub(super) const SIZES: [f64; 5] = [5.0, 6.0, 8.0, 10.0, 14.0];
 
 /// Lines of .1 to 1 mm, upright and slanting.
 fn lines(ink: [u8; 3]) -> Art {
@@ -209,7 +213,7 @@ fn lines(ink: [u8; 3]) -> Art {
 }
 
 /// A map: fields, contours, a river, roads with casings, and names.
-fn map() -> Art {
+pub(super) fn map() -> Art {
     let mut art = Art::new(SIDE, SIDE, |x, y| {
         let (x, y) = (x as f64, y as f64);
         let height = (x / 61.0).sin() + (y / 83.0 + x / 170.0).cos() + 0.3 * ((x + 2.0 * y) / 37.0).sin();
@@ -279,7 +283,7 @@ fn photograph() -> Art {
     })
 }
 
-const GREY: [u8; 3] = [128; 3];
+pub(super) const GREY: [u8; 3] = [128; 3];
 const ORANGE: [u8; 3] = [230, 126, 34];
 const PALE: [u8; 3] = [230; 3];
 
@@ -411,9 +415,8 @@ fn tints_are_even_and_their_dots_hang_together() {
         }
     }
     let lone = lone.iter().sum::<f64>() / lone.len() as f64;
-    println!("lone dots {lone:.3}");
+    println!("lone dots {lone:.3}, grain {grain:?}");
     assert!(lone <= 0.05, "{lone} of the dots lie alone");
-    println!("grain {grain:?}");
     assert!(grain[0] <= 1.5 && grain[1] <= 0.6, "{grain:?}");
 }
 

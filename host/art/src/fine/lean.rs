@@ -1,13 +1,13 @@
 //! Mixtures lean towards the edges of what they fill.
 //!
 //! Problem: where a tone ends at an edge, picked dots leave the edge open between them.
-//! Method: an edge lies between two flat dots whose colours differ by more than [`APART`] and which share a side. Of the two dots of
-//! one side that are nearest to it, the stacks that the other side lacks gain a part ([`PART`]) of what they can gain in the first and lose as
+//! Method: an edge lies between two flat dots whose colours differ by more than `apart` of the rules and which share a side. Of the two dots of
+//! one side that are nearest to it, the stacks that the other side lacks gain a `part` of what they can gain in the first and lose as
 //! much in the second, so the sum stays. A dot without a second one behind it, in strokes of one or two dots, keeps its mixture: more of it
 //! would be more ink than was asked.
 //! Cost: a look at each dot, and some 100 ns at an edge.
 
-use super::super::key::{Key, colour};
+use super::super::key::Key;
 use super::BLOCK;
 use super::mixtures::{Stops, shares, stops};
 use appearance::weights::ONE;
@@ -16,11 +16,6 @@ use appearance::weights::ONE;
 pub(super) const FLAT: Key = 1 << 25;
 /// Marks the colour of a dot of a picture amid its like.
 pub(super) const AREA: Key = 1 << 27;
-
-/// The least difference in red, green or blue of the colours beside an edge.
-const APART: u8 = 40;
-/// How much of what they can gain the stacks gain, in quarters.
-const PART: u32 = 3;
 
 /// Sides of a dot, a bit each, and the way to the neighbour there.
 const SIDES: [(u8, isize, isize); 4] = [(1, -1, 0), (2, 1, 0), (4, 0, -1), (8, 0, 1)];
@@ -48,19 +43,18 @@ pub(super) struct Leans<'a> {
 }
 
 /// Whether there is an edge between two neighbours.
-#[inline]
-fn is_edge(a: Key, b: Key) -> bool {
-    a & b & FLAT > 0 && {
-        let (a, b) = (colour(a), colour(b));
-        (0..3).any(|c| a[c].abs_diff(b[c]) > APART)
-    }
+#[inline(always)]
+fn is_edge(a: Key, b: Key, apart: u32) -> bool {
+    let off = |shift: u32| (a >> shift & 0xff).abs_diff(b >> shift & 0xff);
+    (a & b & FLAT > 0) & (off(0).max(off(8)).max(off(16)) > apart)
 }
 
 impl<'a> Leans<'a> {
+    /// Of rows of dots, of which some are `even`: of one colour.
     #[inline(always)]
-    pub fn new(keys: &'a [Key], width: usize) -> Leans<'a> {
+    pub fn new(keys: &'a [Key], even: &[Option<Key>], apart: u32) -> Leans<'a> {
         let mut edges = vec![0; keys.len()];
-        let rows = keys.len() / width;
+        let (rows, width) = (even.len(), keys.len() / even.len());
         let mut mark = |from: std::ops::Range<usize>, way: usize, (here, there): (u8, u8)| {
             for start in from.clone().step_by(BLOCK) {
                 let block = start..(start + BLOCK).min(from.end);
@@ -70,16 +64,25 @@ impl<'a> Leans<'a> {
                 if a.iter().zip(b).fold(0, |any, pair| any | may_be(pair)) == 0 {
                     continue;
                 }
-                for at in block.filter(|&at| is_edge(keys[at], keys[at + way])) {
-                    edges[at] |= here;
-                    edges[at + way] |= there;
+                // Of a photograph's neighbours hardly any.
+                if !a.iter().zip(b).fold(false, |any, (&a, &b)| any | is_edge(a, b, apart)) {
+                    continue;
                 }
+                let mark = |edges: &mut [u8], side: u8| {
+                    for (edges, (&a, &b)) in edges.iter_mut().zip(a.iter().zip(b)) {
+                        *edges |= side * u8::from(is_edge(a, b, apart));
+                    }
+                };
+                mark(&mut edges[block.clone()], here);
+                mark(&mut edges[block.start + way..block.end + way], there);
             }
         };
         for y in 0..rows {
             let row = y * width..(y + 1) * width;
-            mark(row.start..row.end - 1, 1, (2, 1));
-            if y + 1 < rows {
+            if even[y].is_none() {
+                mark(row.start..row.end - 1, 1, (2, 1));
+            }
+            if y + 1 < rows && (even[y].is_none() || even[y] != even[y + 1]) {
                 mark(row, width, (8, 4));
             }
         }
@@ -88,12 +91,13 @@ impl<'a> Leans<'a> {
         Leans { keys, width, edges, busy, found: Vec::new() }
     }
 
-    /// The dots of a row that lean, from the left.
-    pub fn row(&mut self, y: usize) -> &[Lean] {
+    /// The dots of a row that lean, from the left. A colour that `is_solid` has nothing to lean.
+    #[inline(always)]
+    pub fn row(&mut self, y: usize, is_solid: impl Fn(Key) -> bool) -> &[Lean] {
         self.found.clear();
         for row in y.saturating_sub(1)..(y + 2).min(self.busy.len()) {
             if self.busy[row] {
-                self.beside(row, y);
+                self.beside(row, y, &is_solid);
             }
         }
         // One that is the second of several keeps what was found first.
@@ -103,7 +107,8 @@ impl<'a> Leans<'a> {
     }
 
     /// Adds the dots of row `y` that lean because of an edge of row `row`.
-    fn beside(&mut self, row: usize, y: usize) {
+    #[inline(always)]
+    fn beside(&mut self, row: usize, y: usize, is_solid: &impl Fn(Key) -> bool) {
         let first = row * self.width;
         let (eights, _) = self.edges[first..first + self.width].as_chunks::<8>();
         let mut x = 0;
@@ -113,6 +118,10 @@ impl<'a> Leans<'a> {
                 continue;
             }
             let own = self.keys[first + x];
+            if self.edges[first + x] == 0 || is_solid(own) {
+                x += 1;
+                continue;
+            }
             let mut at_edge = false;
             for (side, right, down) in SIDES.into_iter().filter(|(side, ..)| self.edges[first + x] & side > 0)
             {
@@ -143,7 +152,12 @@ impl<'a> Leans<'a> {
 }
 
 /// The stops of a colour near an edge, beyond which there is another.
-pub(super) fn leaning<const N: usize>(own: &Stops<N>, other: &Stops<N>, at_edge: bool) -> Stops<N> {
+pub(super) fn leaning<const N: usize>(
+    own: &Stops<N>,
+    other: &Stops<N>,
+    at_edge: bool,
+    part: u32,
+) -> Stops<N> {
     let (own_shares, others) = (shares(own), shares(other));
     let lacking: [bool; N] = std::array::from_fn(|q| others[q] == 0);
     let sum: u32 =
@@ -152,7 +166,7 @@ pub(super) fn leaning<const N: usize>(own: &Stops<N>, other: &Stops<N>, at_edge:
     if sum == 0 || sum == all {
         return *own;
     }
-    let change = sum.min(all - sum) * PART / 4;
+    let change = sum.min(all - sum) * part / 100;
     let wanted = if at_edge { sum + change } else { sum - change };
     let parts = own_shares.iter().zip(lacking).map(|(&share, lacks)| {
         let (to, from) = if lacks { (wanted, sum) } else { (all - wanted, all - sum) };

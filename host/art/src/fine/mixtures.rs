@@ -3,7 +3,7 @@
 //! Problem: thirty million dots each need the stack that their threshold picks from the mixture of their colour.
 //! Method: the stacks lie in order of lightness on [0, 1), the darkest first, each with its share; [`Stops`] are where they end. So
 //! a threshold picks the stack whose number is how many stops it has reached. Stops are linear in the shares: those of the nodes
-//! of the `lattice` are interpolated like mixtures. In flat colours a share below [`LEAST`] is dropped, since it would only be specks, and the colours
+//! of the `lattice` are interpolated like mixtures. In flat colours a share below [`Rules::least`] is dropped, since it would only be specks, and the colours
 //! that are the name of a stack are that stack.
 //! Cost: 10 ns a colour. Limits: `N` stacks.
 
@@ -15,8 +15,20 @@ use super::super::lattice::{ALL, NODES};
 use super::super::solids::Solids;
 use appearance::weights::ONE;
 
-/// The share that counts in a flat colour.
-const LEAST: u16 = (ONE as u32 * 3 / 100) as u16;
+/// What decides about mixtures. A test moves each of these by a fifth.
+#[derive(Clone, Copy)]
+pub struct Rules {
+    /// The share that counts in a flat colour.
+    pub least: u16,
+    /// The least difference in red, green or blue of the colours beside an edge.
+    pub apart: u32,
+    /// How much of what they can gain the stacks gain at an edge, in hundredths.
+    pub part: u32,
+}
+
+impl Rules {
+    pub const USUAL: Rules = Rules { least: (ONE as u32 * 3 / 100) as u16, apart: 40, part: 75 };
+}
 
 /// Where each stack ends, in the order of [`Mixtures::stacks`]; [`ONE`] after the last.
 pub type Stops<const N: usize> = [u16; N];
@@ -24,6 +36,7 @@ pub type Stops<const N: usize> = [u16; N];
 /// The mixtures of all colours.
 pub struct Mixtures<'a, const N: usize> {
     solids: &'a Solids<'a>,
+    pub rules: Rules,
     /// The stacks in the order of lightness.
     stacks: Vec<Stack>,
     /// Stops of the nodes of each lattice.
@@ -68,6 +81,7 @@ impl<'a, const N: usize> Mixtures<'a, N> {
         });
         Mixtures {
             solids,
+            rules: Rules::USUAL,
             stacks: numbers.iter().map(|&q| fit.stacks[q].clone()).collect(),
             nodes: nodes.collect(),
             steps: fit.steps,
@@ -79,12 +93,23 @@ impl<'a, const N: usize> Mixtures<'a, N> {
     }
 
     /// The stops of a colour that names a stack.
+    #[inline(always)]
     fn named(&self, colour: [u8; 3]) -> Option<Stops<N>> {
+        self.number_of_named(colour).map(alone)
+    }
+
+    /// Whether a colour names a stack.
+    #[inline(always)]
+    pub fn is_named(&self, colour: [u8; 3]) -> bool {
+        self.number_of_named(colour).is_some()
+    }
+
+    #[inline(always)]
+    fn number_of_named(&self, colour: [u8; 3]) -> Option<usize> {
         if colour.iter().any(|&v| v != 0 && v != 255) {
             return None;
         }
-        let bits = colour.iter().fold(0, |bits, &v| 2 * bits + usize::from(v > 0));
-        self.named[bits].map(alone)
+        self.named[colour.iter().fold(0, |bits, &v| 2 * bits + usize::from(v > 0))]
     }
 
     /// The stops of the colour of a label: its solid, if there is one.
@@ -104,28 +129,27 @@ impl<'a, const N: usize> Mixtures<'a, N> {
     #[inline(always)]
     fn between(&self, colour: [u8; 3], drawn: bool) -> Stops<N> {
         let [x, y, z] = colour.map(|v| self.steps[usize::from(v)]);
-        let mut axes = [(x.1, NODES * NODES), (y.1, NODES), (z.1, 1)];
-        for (a, b) in [(0, 1), (1, 2), (0, 1)] {
-            if axes[a].0 < axes[b].0 {
-                axes.swap(a, b);
-            }
-        }
+        // How far each axis goes in the upper half and its step in the lower one: sorted as numbers, without a branch.
+        let axis = |far: u32, step: usize| far << 16 | step as u32;
+        let [x_axis, y_axis, z_axis] = [axis(x.1, NODES * NODES), axis(y.1, NODES), axis(z.1, 1)];
+        let (high, low) = (x_axis.max(y_axis), x_axis.min(y_axis));
+        let (middle, least) = (low.max(z_axis), low.min(z_axis));
+        let axes = [high.max(middle), high.min(middle), least, 0];
         let mut node = self.lattices[usize::from(drawn)] * ALL + (x.0 * NODES + y.0) * NODES + z.0;
         let mut sums = [0u16; N];
         let mut last = 256;
-        for (next, step) in axes.into_iter().chain([(0, 0)]) {
+        for axis in axes {
+            let (next, step) = (axis >> 16, axis & 0xffff);
             let part = last - next;
             if part == 256 {
                 return self.nodes[node];
             }
-            if part > 0 {
-                // Fewer than all parts: 16 bits, whose product's upper half is one operation for all stops.
-                let part = (part << 8) as u16;
-                for (sum, &stop) in sums.iter_mut().zip(&self.nodes[node]) {
-                    *sum += ((u32::from(stop) * u32::from(part)) >> 16) as u16;
-                }
+            // Fewer than all parts: 16 bits, whose product's upper half is one operation for all stops.
+            let part = (part << 8) as u16;
+            for (sum, &stop) in sums.iter_mut().zip(&self.nodes[node]) {
+                *sum += ((u32::from(stop) * u32::from(part)) >> 16) as u16;
             }
-            (last, node) = (next, node + step);
+            (last, node) = (next, node + step as usize);
         }
         // Rounding down loses less than one unit at each of four nodes.
         sums.map(|sum| if sum > ONE - 4 { ONE } else { sum })
@@ -134,16 +158,16 @@ impl<'a, const N: usize> Mixtures<'a, N> {
     /// The stops of a flat colour.
     pub fn flat(&self, colour: [u8; 3], drawn: bool) -> Stops<N> {
         let whole = shares(&self.stops(colour, drawn));
-        if whole.iter().all(|&share| share == 0 || share >= LEAST) {
+        if whole.iter().all(|&share| share == 0 || share >= self.rules.least) {
             return stops(&whole);
         }
         stops(&self.without_specks(&whole))
     }
 
-    /// Such shares without those that are less than [`LEAST`]. What they do to the lightness the others make up for: each changes in
+    /// Such shares without those that are less than [`Rules::least`]. What they do to the lightness the others make up for: each changes in
     /// proportion to how much lighter than their mean it is.
     fn without_specks(&self, whole: &[u16; N]) -> [u16; N] {
-        let kept = whole.map(|share| if share < LEAST { 0.0 } else { f64::from(share) });
+        let kept = whole.map(|share| if share < self.rules.least { 0.0 } else { f64::from(share) });
         let mean = |shares: &[f64; N]| {
             let sum: f64 = shares.iter().sum();
             shares.iter().zip(&self.light).map(|(share, light)| share * light).sum::<f64>() / sum.max(1.0)

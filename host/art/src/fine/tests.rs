@@ -5,8 +5,9 @@ use std::sync::LazyLock;
 use super::super::fit::Wishes;
 use super::super::intent::Intent;
 use super::super::key::key;
-use super::super::kinds::ObjectType;
+use super::super::kinds::{INKS_OF_PICTURES, ObjectType};
 use super::super::pixels::Pixels;
+use super::mixtures::Rules;
 use super::*;
 use appearance::brdf::Space;
 use appearance::document::SAMPLES;
@@ -24,7 +25,7 @@ pub(super) static INKS: LazyLock<(Fit, Solids<'static>)> = LazyLock::new(|| {
     let printable: &'static Printable =
         Box::leak(Box::new(Printable::from_library(&Library::builtin(), &process, &space)));
     let solids = Solids::new(printable, &space);
-    let wishes = Wishes { intent: Intent::Auto, gamma: 1.0, has_drawings: true };
+    let wishes = Wishes { intent: Intent::Auto, gamma: 1.0, has_drawings: true, has_pictures: true };
     let fit = Fit::new((printable, &solids), space, &wishes, &Silent).unwrap();
     (fit, solids)
 });
@@ -43,13 +44,20 @@ impl Art {
         Art { width, height, rgb }
     }
 
-    /// The stack of each of so many dots by the table for `minimum` dots.
+    /// The stack of each of so many dots.
     pub fn dots(&self, kind: ObjectType, dots: (usize, usize)) -> Vec<u8> {
+        self.dots_by(Rules::USUAL, kind, dots)
+    }
+
+    /// The same by these rules.
+    pub fn dots_by(&self, rules: Rules, kind: ObjectType, dots: (usize, usize)) -> Vec<u8> {
         let tag = if kind == ObjectType::Picture { ObjectType::PICTURE } else { ObjectType::DRAWING };
         let bytes = self.rgb.iter().flat_map(|&[r, g, b]| [tag, r, g, b]).collect();
         let pixels = Pixels { bytes, each: 4, width: self.width, height: self.height };
         let (fit, solids) = &*INKS;
-        super::dots(pixels.rows(dots, false), dots, fit, solids, Table::for_cluster(USUAL))
+        let mut mixtures = Mixtures::<16>::new(fit, solids);
+        mixtures.rules = rules;
+        strips(&pixels.rows(dots, false), dots, STRIP, &mixtures, Table::for_cluster(USUAL))
     }
 
     fn at_dots(&self) -> Vec<u8> {
@@ -93,6 +101,18 @@ fn a_colour_that_is_a_stack_is_that_stack() {
                 assert_eq!(dots[at], stack(name), "{colour:?} of {kind:?} at {}, {}", at % 64, at / 64);
             }
         }
+    }
+}
+
+/// As a mask in CMYK has it.
+#[test]
+fn full_inks_of_a_picture_in_a_page_are_these_inks() {
+    for (colour, named) in INKS_OF_PICTURES {
+        let dots = |colour: [u8; 3]| {
+            let art = Art::new(64, 64, |x, y| if (x / 3 + y / 3) % 2 > 0 { colour } else { [255; 3] });
+            art.dots(ObjectType::Picture, (64, 64))
+        };
+        assert_eq!(dots(colour), dots(named), "{colour:?}");
     }
 }
 
