@@ -1,3 +1,4 @@
 //! The stages from outside.
 
 mod damaged_stages;
+mod views;

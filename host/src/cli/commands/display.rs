@@ -118,9 +118,9 @@ impl Image {
         if is_picture(path) {
             return Ok(Image::Matte(Matte::read(path, Space::half_angle(SAMPLES))?));
         }
-        let document =
-            DocumentArgs { document: name.into(), material: None, colour_space: None, samples: SAMPLES };
-        Ok(Image::Document(Box::new(document.open(observer)?)))
+        let document = DocumentArgs::named(name.into());
+        let at_hand = || InkArgs::of(None, None).at_hand();
+        Ok(Image::Document(Box::new(document.open(at_hand, observer)?)))
     }
 
     fn materials(&self) -> &dyn Materials {

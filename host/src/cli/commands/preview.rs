@@ -104,7 +104,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         bail!(
             "--show {}: {} has printed dots and no document; leave --show out, or name a document",
             if what == Show::Document { "document" } else { "mapped" },
-            args.dots.document.document
+            args.dots.document.path().display()
         );
     }
     let (tone, (width, height)) = if is_page {
