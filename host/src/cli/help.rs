@@ -67,7 +67,7 @@ const GROUPS: &[(&str, &[&str])] = &[
             "curl",
         ],
     ),
-    ("View", &["light-probe", "distance", "middle", "seen-from", "tilt", "exposure", "tone-curve"]),
+    ("View", &["figure", "light-probe", "distance", "middle", "seen-from", "tilt", "exposure", "tone-curve"]),
     ("Worn printer", &["registration-error", "feed-error", "missing-dots", "wear-seed", "dot-gain"]),
     ("Result", &["preset", "probe", "background", "output", "cut-lines", "json"]),
     ("Sending", &["to", "copies", "force", "yes"]),

@@ -13,6 +13,7 @@ mod canvas;
 mod contrasts;
 mod error;
 mod fidelity;
+pub mod figures;
 mod fine;
 mod flat;
 pub mod inks;

@@ -75,6 +75,13 @@ impl<'a> Panels<'a> {
         Ok(Panels { lights, width, height, rows, each: false })
     }
 
+    /// Leaves the magnified dots out.
+    #[must_use]
+    pub fn without_dots(mut self) -> Panels<'a> {
+        self.rows.truncate(2);
+        self
+    }
+
     /// Gives each light an exposure of its own, as an eye adapts.
     #[must_use]
     pub fn each_exposed(self) -> Panels<'a> {
