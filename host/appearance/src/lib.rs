@@ -3,7 +3,7 @@
 //! The modules follow the data, and each uses only the ones before it: [`brdf`] holds curves and the metric that compares
 //! them, [`weights`] fixed-point weight maps, [`solve`] the constrained least squares, [`materials`] what the pixels of a
 //! document reflect, [`sample`] drawn materials to try things on, and [`wide`] loops over lanes. [`document`] reads and writes files of materials,
-//! [`factor`] turns materials into bases and weights, [`gamut`] maps the bases to stacks of ink, and [`edit`] changes them. Nothing
+//! [`factor`] turns materials into bases and weights, [`gamut`] maps the bases to stacks of ink, [`edit`] changes them, and [`views`] makes a document of two pictures. Nothing
 //! here knows about dots, pages or printers.
 #![deny(unsafe_code)]
 #![allow(
@@ -23,5 +23,6 @@ pub mod materials;
 pub mod sample;
 pub mod solve;
 pub mod srgb;
+pub mod views;
 pub mod weights;
 pub mod wide;

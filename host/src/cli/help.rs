@@ -37,7 +37,7 @@ const EXAMPLES: usize = 3;
 
 /// What the other options of these commands are about.
 const GROUPS: &[(&str, &[&str])] = &[
-    ("Document", &["material", "colour-space", "samples", "document"]),
+    ("Document", &["straight", "highlight", "hdr", "material", "colour-space", "samples", "document"]),
     ("Artwork", &["reserved", "colour", "tolerance", "dpi", "page", "pages", "tones", "gamma", "accept"]),
     ("Layers of ink", &["order", "passes", "knockout", "white", "choke", "spread", "finish"]),
     (
@@ -67,7 +67,7 @@ const GROUPS: &[(&str, &[&str])] = &[
             "curl",
         ],
     ),
-    ("View", &["light-probe", "distance", "middle", "seen-from", "tilt", "exposure", "tone-curve"]),
+    ("View", &["figure", "light-probe", "distance", "middle", "seen-from", "tilt", "exposure", "tone-curve"]),
     ("Worn printer", &["registration-error", "feed-error", "missing-dots", "wear-seed", "dot-gain"]),
     ("Result", &["preset", "probe", "background", "output", "cut-lines", "json"]),
     ("Sending", &["to", "copies", "force", "yes"]),

@@ -65,6 +65,22 @@ fn documents_are_shown_by_stacks_that_are_chosen_for_them() {
     assert!(bench.path("tile-display.print/display.html").is_file());
 }
 
+/// The bar of the larger picture is where that of the smaller one is.
+#[test]
+fn pictures_of_two_sizes_are_shown_at_that_of_the_smaller() {
+    let bench = Bench::new();
+    picture(&bench, "small.png", (24, 16), 1);
+    let large = image::open(bench.path("small.png")).unwrap().resize_exact(
+        72,
+        48,
+        image::imageops::FilterType::Nearest,
+    );
+    large.save(bench.path("large.png")).unwrap();
+    bench.done(&format!("display large.png small.png {SCREEN} -o wall --stacks W,K"));
+    let mask = |name: &str| image::open(bench.path(name)).expect("a mask").into_luma8();
+    assert_eq!(mask("wall/mask-001.png"), mask("wall/mask-002.png"));
+}
+
 #[test]
 fn what_cannot_be_shown_is_refused_and_nothing_is_written() {
     let bench = Bench::new();
@@ -73,7 +89,7 @@ fn what_cannot_be_shown_is_refused_and_nothing_is_written() {
     picture(&bench, "huge.png", (5000, 4000), 1);
     fs::write(bench.path("text.png"), "no picture").unwrap();
     for (args, words) in [
-        ("one.png other.png", ["other.png: 20 x 16 pixels, but one.png has 24 x 16", "same number"]),
+        ("one.png other.png", ["one.png: 24 x 16 pixels, but other.png has 20 x 16", "same proportions"]),
         ("huge.png", ["10020 x 8020 pixels of the screen", "--pixels"]),
         ("text.png", ["text.png: expected a PNG, JPEG or TIFF", ""]),
         ("missing.png", ["missing.png", ""]),

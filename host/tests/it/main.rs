@@ -26,4 +26,5 @@ mod send;
 mod sources;
 mod text;
 mod threads;
+mod views;
 mod words;

@@ -355,3 +355,28 @@ fn what_cannot_be_shown_is_refused_with_what_to_do_and_leaves_nothing() {
         assert!(!bench.path("out.png").exists(), "{args}");
     }
 }
+
+#[test]
+fn figures_of_the_paper_are_pictures_of_any_document() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    let size = |name: &str| image::image_dimensions(bench.path(name)).expect("a picture");
+    bench.done(&format!("preview tile {SMALL} --bases 3 --figure weights -o weights.png"));
+    // Three balls of 160 pixels in a row, each above its map.
+    assert_eq!(size("weights.png").0, 16 + 3 * 176);
+    bench.done(&format!("preview tile {SMALL} --bases 3 --figure balls -o balls.png"));
+    assert_eq!(size("balls.png").0, 16 + 4 * 176);
+    bench.done(&format!("preview tile {SMALL} --figure lights -o lights.png"));
+    assert_eq!(size("lights.png").0, 16 + 6 * 316);
+    // The lower the lamp, the less light: left to right the row becomes darker.
+    let picture = image::open(bench.path("lights.png")).expect("a picture").into_rgb8();
+    let light = |column: u32| -> u64 {
+        let xs = 16 + column * 316..16 + column * 316 + 300;
+        xs.flat_map(|x| (80..200).map(move |y| (x, y)))
+            .map(|(x, y)| u64::from(picture.get_pixel(x, y).0[1]))
+            .sum()
+    };
+    assert!(light(2) > light(4) && light(4) > light(5), "{} {} {}", light(2), light(4), light(5));
+    let refused = bench.run(&format!("preview tile {SMALL} --figure lights -o lights.html"));
+    assert!(!refused.status.success());
+}

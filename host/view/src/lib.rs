@@ -16,6 +16,7 @@
               most casts"
 )]
 
+mod coat;
 pub mod display;
 mod error;
 

@@ -111,6 +111,53 @@ fn a_ball_lit_from_the_eye_is_the_references_ball() {
     }
 }
 
+/// A glTF file with a clear coat, read and lit, against the reference with both lobes by the extension's formula.
+#[test]
+fn a_ball_under_a_clear_coat_is_the_references_ball() {
+    let Some(script) = reference() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let (csv, out) = (dir.path().join("curve.csv"), dir.path().join("ball.npy"));
+    for (weight, base, coat) in [(1.0, 0.6, 0.3), (0.5, 0.7, 0.25)] {
+        let gltf = format!(
+            r#"{{"asset": {{"version": "2.0"}}, "extensionsUsed": ["KHR_materials_clearcoat"], "materials": [{{"name": "lacquer",
+            "pbrMetallicRoughness": {{"baseColorFactor": [0.5, 0.2, 0.1, 1], "metallicFactor": 0, "roughnessFactor": {base}}},
+            "extensions": {{"KHR_materials_clearcoat": {{"clearcoatFactor": {weight}, "clearcoatRoughnessFactor": {coat}}}}}}}]}}"#
+        );
+        let path = dir.path().join("lacquer.gltf");
+        std::fs::write(&path, gltf).unwrap();
+        let document =
+            appearance::document::open(path.to_str().unwrap(), &Default::default(), &Silent).unwrap();
+        let space = document.materials().space();
+        let mut row = vec![0.0f32; space.columns()];
+        document.materials().reflectance(0, &mut row);
+        let ours = space.curve(&row.into_iter().map(f64::from).collect::<Vec<_>>());
+        // The base under the coat, which light passes twice, and the coat's own lobe.
+        let expected = |f0: f64| {
+            let angle = |n: u32| std::f64::consts::FRAC_PI_2 * (f64::from(n) / 19_999.0).powi(2);
+            let angles: Vec<f64> = (0..20_000).map(angle).collect();
+            Curve::sampled(&angles, |t| {
+                [0.5, 0.2, 0.1].map(|colour: f64| {
+                    let below = colour * 0.96 / std::f64::consts::PI + 0.04 * inks::ggx::lobe(t, base * base);
+                    (1.0 - weight + weight * (1.0 - f0) * (1.0 - f0)) * below
+                        + weight * f0 * inks::ggx::lobe(t, coat * coat)
+                })
+            })
+        };
+        let compare = |curve: &Curve| {
+            curve.to_csv(std::fs::File::create(&csv).unwrap()).unwrap();
+            let theirs = run(&script, "sphere-dir", &[], &csv, &out, 96);
+            difference(&sphere::under_light(&ours, [0.0, 0.0, 1.0], 96).unwrap(), &theirs)
+        };
+        let (most, rms) = compare(&expected(0.04));
+        println!("coat {weight}: greatest difference {most:.2e} of a pixel, rms {rms:.2e} of the ball");
+        assert!(most < 0.01 && rms < 0.005, "coat {weight}: greatest {most}, rms {rms}");
+        // A coat of another index, or none, is another ball.
+        for f0 in [0.0, 0.05] {
+            assert!(compare(&expected(f0)).1 > 0.01, "f0 {f0}");
+        }
+    }
+}
+
 #[test]
 fn balls_under_a_probe_are_the_references_balls() {
     let Some(script) = reference() else { return };

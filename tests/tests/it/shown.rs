@@ -45,7 +45,7 @@ const ELSEWHERE: [(&str, &str); 21] = [
 ];
 
 /// Documents that show commands, and the folder these are typed in.
-const DOCUMENTS: [(&str, &str); 15] = [
+const DOCUMENTS: [(&str, &str); 16] = [
     ("README.md", "."),
     ("docs/guide.md", "."),
     ("docs/guide/charts.md", "."),
@@ -58,6 +58,7 @@ const DOCUMENTS: [(&str, &str); 15] = [
     ("docs/guide/preview.md", "."),
     ("docs/guide/queue.md", "."),
     ("docs/guide/serve.md", "."),
+    ("docs/guide/two-pictures.md", "docs/guide/views"),
     ("docs/emulator.md", "."),
     ("docs/measuring-inks.md", "."),
     ("docs/wiring.md", "."),
@@ -350,6 +351,11 @@ fn previews() {
 }
 
 #[test]
+fn two_pictures() {
+    document("docs/guide/two-pictures.md");
+}
+
+#[test]
 fn measuring_inks() {
     document("docs/measuring-inks.md");
 }
@@ -525,6 +531,9 @@ fn files_of_the_examples(desk: &Desk) {
         disc(&folder.join(format!("{ink}.png")));
     }
     copy(&folder.join("docs/guide/decal"), &folder.join("decal"));
+    for picture in ["day.png", "night.png", "window.hdr"] {
+        fs::copy(folder.join("docs/guide/views").join(picture), folder.join(picture)).unwrap();
+    }
     copy(&root().join("inks/library"), &folder.join("my-library"));
     copy(&folder.join("docs/guide/few-stacks"), &folder.join("mine"));
     fs::copy(folder.join("docs/guide/readings/k.toml"), folder.join("k.toml")).unwrap();

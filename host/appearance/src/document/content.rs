@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::materials::{Factored, Materials, Surfaces, Uniform};
+use crate::views::Views;
 
 /// Default number of half-angle samples per curve.
 pub const SAMPLES: usize = 32;
@@ -63,6 +64,8 @@ pub struct Document {
     pub notes: Vec<String>,
     /// SHA-256 over the files read (their names and bytes), in hexadecimal.
     pub digest: String,
+    /// What two pictures it shows, if it was made of two.
+    pub views: Option<Views>,
 }
 
 impl Document {

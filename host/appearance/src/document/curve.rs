@@ -55,5 +55,6 @@ pub(super) fn document(
         size_mm: Some((SWATCH_MM, SWATCH_MM)),
         notes,
         digest,
+        views: None,
     })
 }

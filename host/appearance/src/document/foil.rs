@@ -201,6 +201,7 @@ pub(super) fn open(path: &Path, mut source: Source<'_>) -> Result<Document, Docu
         size_mm: index.size_mm.map(|[w, h]| (w, h)),
         notes,
         digest,
+        views: None,
     })
 }
 

@@ -204,6 +204,7 @@ pub(super) fn open(
         size_mm: settings.size_mm.map(|[w, h]| (w, h)),
         notes,
         digest,
+        views: None,
     })
 }
 

@@ -90,6 +90,7 @@ pub(super) fn open(
         size_mm: (!textured).then_some((SWATCH_MM, SWATCH_MM)),
         notes,
         digest,
+        views: None,
     })
 }
 

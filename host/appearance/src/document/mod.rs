@@ -29,7 +29,7 @@ mod sample;
 pub(crate) mod source;
 mod spectrum;
 mod tensor;
-mod texture;
+pub(crate) mod texture;
 
 pub use content::{ColourSpace, Content, Document, Options, SAMPLES, name_of};
 pub use error::DocumentError;

@@ -61,6 +61,7 @@ pub(super) fn open(name: &str, space: Space, observer: &dyn Observer) -> Result<
         size_mm: Some((width, height)),
         notes,
         digest,
+        views: None,
     })
 }
 

@@ -31,6 +31,9 @@ const CARTRIDGE_SAMPLE: usize = 256;
 /// The automatic choice blends if at most this share of the pairs that clamping merges are still merged.
 const HELPS: f64 = 0.8;
 
+/// The part of an equal share that every basis has at least where cartridges and stacks are chosen.
+const LEAST_SHARE: f64 = 0.25;
+
 /// Pixels of that sample from which typical materials are chosen.
 const TYPICAL_SAMPLE: usize = 256;
 
@@ -213,8 +216,11 @@ impl<'a> Pixels<'a> {
             Ok::<_, GamutError>(())
         };
         if let Some(bases) = bases {
-            for (i, (row, share)) in bases.bases.rows().zip(bases.shares()).enumerate() {
-                add(row, share, format!("basis {i}"))?;
+            let shares = bases.shares();
+            for (i, (row, share)) in bases.bases.rows().zip(&shares).enumerate() {
+                // A twig is seen as well as the sky around it: no basis counts less than a part of an equal share.
+                let importance = share.max(LEAST_SHARE / shares.len() as f64);
+                add(row, importance, format!("basis {i}"))?;
             }
         }
         if self.settings.intent != Intent::Basis {

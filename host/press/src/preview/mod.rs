@@ -10,8 +10,10 @@
 //! [`Panels`] and [`materials_picture()`] lay the results out.
 
 mod canvas;
+mod contrasts;
 mod error;
 mod fidelity;
+pub mod figures;
 mod fine;
 mod flat;
 pub mod inks;
@@ -27,6 +29,7 @@ mod tone;
 mod wear;
 
 pub use canvas::picture;
+pub use contrasts::{Contrasts, contrasts};
 pub use error::{LONGEST_SIDE, PreviewError};
 pub use fidelity::{EYE, FidelityReport, fidelity, spot_mm};
 pub use fine::{ENTRIES, Fine};
@@ -34,7 +37,7 @@ pub use flat::{Light, flat};
 pub use materials_picture::{Swatch, materials_picture, mix_in_words};
 pub use probe::Probe;
 pub use radiance::Radiance;
-pub use sheet_picture::{Panels, STANDARD_LIGHTS};
+pub use sheet_picture::{Panels, STANDARD_LIGHTS, TILTS};
 pub use source::Source;
 pub use spectrum::{Spectrum, spectrum};
 pub use tone::ToneCurve;

@@ -1,7 +1,8 @@
 //! The target beside the simulated print, under several lights: `sheet.png`.
 //!
 //! The picture has a column for each light and three rows: the target, the print, and a close-up of the print's dots where
-//! they vary most. All panels share one exposure, that of the target, so a difference between rows is a difference on paper.
+//! they vary most. All panels of a column share one exposure, that of the target, so a difference between rows is a difference on
+//! paper; columns share it, too, unless [`Panels::each_exposed`] is asked for.
 
 use image::RgbImage;
 
@@ -23,6 +24,14 @@ pub const STANDARD_LIGHTS: [(&str, Light); 4] = [
     ("raking light", Light::Point([0.0, 2.1, 1.4])),
 ];
 
+/// Far lights at four angles to an eye above: the reflection, two tilts, and the 45 degrees at which colours are measured.
+pub const TILTS: [(&str, Light); 4] = [
+    ("in the reflection", Light::Far([0.0, 0.0, 1.0])),
+    ("light 15° beside", Light::Far([0.258_819_045, 0.0, 0.965_925_826])),
+    ("light 30° beside", Light::Far([0.5, 0.0, 0.866_025_404])),
+    ("straight on, light 45°", Light::Far([1.0, 0.0, 1.0])),
+];
+
 const GAP: usize = 16;
 
 /// Width of a dot in the close-up, in pixels.
@@ -37,6 +46,8 @@ pub struct Panels<'a> {
     width: usize,
     height: usize,
     rows: Vec<(&'static str, Vec<Radiance>)>,
+    /// Whether each light has an exposure of its own.
+    each: bool,
 }
 
 impl<'a> Panels<'a> {
@@ -61,7 +72,20 @@ impl<'a> Panels<'a> {
         if let Some(panels) = close_up(print, &only, width, height, observer)? {
             rows.push(("the print's dots", panels));
         }
-        Ok(Panels { lights, width, height, rows })
+        Ok(Panels { lights, width, height, rows, each: false })
+    }
+
+    /// Leaves the magnified dots out.
+    #[must_use]
+    pub fn without_dots(mut self) -> Panels<'a> {
+        self.rows.truncate(2);
+        self
+    }
+
+    /// Gives each light an exposure of its own, as an eye adapts.
+    #[must_use]
+    pub fn each_exposed(self) -> Panels<'a> {
+        Panels { each: true, ..self }
     }
 
     /// Lays them out. `title` stands above the picture and `notes` below it, one line each.
@@ -69,8 +93,11 @@ impl<'a> Panels<'a> {
     /// # Errors
     /// A picture larger than [`LONGEST_SIDE`](super::LONGEST_SIDE).
     pub fn picture(&self, title: &str, notes: &[String]) -> Result<RgbImage, PreviewError> {
-        let &Panels { lights, width, height, ref rows } = self;
-        let tone = ToneCurve::of(&rows[0].1);
+        let &Panels { lights, width, height, ref rows, each } = self;
+        let target = &rows[0].1;
+        let tones: Vec<ToneCurve> = (0..target.len())
+            .map(|light| ToneCurve::of(if each { &target[light..=light] } else { target }))
+            .collect();
 
         let head = GAP + Letters::Title.height() + GAP;
         let label = Letters::Plain.height() + 6;
@@ -85,7 +112,7 @@ impl<'a> Panels<'a> {
                 let room = width / Letters::Plain.width();
                 let words = if i == 0 { format!("{name} · {light}") } else { (*light).to_string() };
                 canvas.text(left, top, Letters::Plain, INK, &shortened(&words, room));
-                canvas.paste(left, top + label, panel, tone);
+                canvas.paste(left, top + label, panel, tones[i]);
             }
         }
         let below = head + rows.len() * (label + height + GAP);

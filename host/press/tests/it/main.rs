@@ -1,3 +1,5 @@
 //! The stages from outside.
 
 mod damaged_stages;
+mod dove;
+mod views;

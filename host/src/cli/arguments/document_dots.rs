@@ -1,18 +1,20 @@
 //! A document with everything that decides its dots, and the dots: what `print`, `preview` and `compare` begin with.
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::Args as ClapArgs;
 use inks::{InkSet, Library};
 
 use crate::cli::arguments::layout::LayoutArgs;
 use crate::cli::arguments::{DocumentArgs, FactorArgs, GamutArgs, HalftoneArg, InkArgs};
+use appearance::brdf::reflectances;
 use appearance::document::Document;
 use appearance::factor::{self, Factored};
 use appearance::gamut::{self, Gain, Intent};
 use observe::Observer;
 use press::layout::Layout;
 use press::pipeline::document::{self, Halftoned, Settings};
-use sheet::Size;
+use press::preview::{self, Contrasts, EYE, Source};
+use sheet::{Area, Size};
 
 /// Bases of a document whose print needs none, so that the picture of it is close.
 const BASES: usize = 12;
@@ -46,6 +48,8 @@ pub struct DocumentDots {
     pub settings: Settings,
     pub layout: Layout,
     pub halftoned: Halftoned,
+    /// How well each of two pictures is seen, if the document was made of two.
+    pub contrasts: Option<Contrasts>,
 }
 
 impl DocumentDots {
@@ -66,13 +70,14 @@ impl DotsArgs {
     /// The document's dots. Nothing is written.
     pub fn document_dots(&self, observer: &dyn Observer) -> Result<DocumentDots> {
         let (inks, library) = self.inks.at_hand()?;
-        self.halftone(self.document.open(observer)?, inks, library, observer)
+        let document = self.document.open(|| Ok((inks, library.clone())), observer)?;
+        self.halftone(document, inks, library, observer)
     }
 
     /// The dots of a document that is open already.
     pub fn halftone(
         &self,
-        document: Document,
+        mut document: Document,
         inks: InkSet,
         library: Library,
         observer: &dyn Observer,
@@ -101,8 +106,28 @@ impl DotsArgs {
         {
             observer.note(&words);
         }
-        Ok(DocumentDots { document, library, settings, layout, halftoned })
+        let contrasts = contrasts(&document, &library, &halftoned)?;
+        if let Some(contrasts) = &contrasts {
+            if let Some(name) = contrasts.lost() {
+                bail!(
+                    "nothing is left of {name} in the print: {contrasts}; allow more inks (--inks all), print larger, or give the other \
+                     picture less contrast"
+                );
+            }
+            observer.note(&contrasts.to_string());
+            document.notes.push(contrasts.to_string());
+        }
+        Ok(DocumentDots { document, library, settings, layout, halftoned, contrasts })
     }
+}
+
+/// How well each of two pictures is seen on the dots.
+fn contrasts(document: &Document, library: &Library, halftoned: &Halftoned) -> Result<Option<Contrasts>> {
+    let (Some(views), Some(target)) = (&document.views, document.as_factored()) else { return Ok(None) };
+    let dots = &halftoned.dots;
+    let stacks = reflectances(dots.stacks(), library, &target.space);
+    let print = Source::Print { dots, space: &target.space, stacks: &stacks, area: Area::whole(dots) };
+    Ok(preview::contrasts(target, views, &print, EYE)?)
 }
 
 /// What foils would bring to what the intent maps, if that can be seen.

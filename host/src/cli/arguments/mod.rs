@@ -7,6 +7,9 @@ pub mod layout;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
+use appearance::brdf::Space;
+use appearance::gamut::Printable;
+use appearance::views::{self, Pictures};
 use clap::Args;
 use inks::{InkSet, InkSetError, Library, Trust};
 
@@ -24,8 +27,16 @@ use observe::Observer;
 pub struct DocumentArgs {
     /// Document: a folder of texture maps or its .zip, a .gltf, .glb or .mtlx file, a measured BRDF (.binary, .bsdf, .brdf, .csv), a
     /// .foil folder, or sample:NAME
-    #[arg(value_name = "DOC", value_parser = utf8())]
+    #[arg(
+        value_name = "DOC",
+        value_parser = utf8(),
+        default_value = "",
+        hide_default_value = true,
+        required_unless_present_any = ["straight", "hdr"]
+    )]
     pub document: String,
+    #[command(flatten)]
+    pub pictures: PicturesArgs,
     /// Material of a glTF file, by number (from 0) or name [default: the only one]
     #[arg(long, value_name = "NUMBER|NAME")]
     pub material: Option<String>,
@@ -37,9 +48,71 @@ pub struct DocumentArgs {
     pub samples: usize,
 }
 
+/// Pictures to make a document of.
+#[derive(Args, Debug, Default)]
+pub struct PicturesArgs {
+    /// Picture seen straight on, where --highlight names another one that is seen in the reflection of the light
+    #[arg(long, value_name = "PICTURE", requires = "highlight", conflicts_with_all = ["document", "material", "hdr"])]
+    pub straight: Option<PathBuf>,
+    /// Picture of the same proportions seen in the reflection of the light. What is black in it cannot be seen: a white
+    /// mark on black is hidden until the light falls on it
+    #[arg(long, value_name = "PICTURE", requires = "straight", conflicts_with_all = ["document", "material", "hdr"])]
+    pub highlight: Option<PathBuf>,
+    /// Picture with more light than white (.hdr, .exr, float .tif), whose exposure changes as the print is tilted
+    #[arg(long, value_name = "PICTURE", conflicts_with_all = ["document", "material"])]
+    pub hdr: Option<PathBuf>,
+}
+
+impl PicturesArgs {
+    fn pictures(&self) -> Option<Pictures> {
+        match (&self.straight, &self.highlight, &self.hdr) {
+            (Some(straight), Some(highlight), _) => {
+                Some(Pictures::Pair { straight: straight.clone(), highlight: highlight.clone() })
+            }
+            (_, _, Some(hdr)) => Some(Pictures::Exposures(hdr.clone())),
+            _ => None,
+        }
+    }
+
+    /// The options given, by their long names without dashes.
+    pub fn given(&self) -> impl Iterator<Item = (&'static str, &Path)> {
+        let all = [("straight", &self.straight), ("highlight", &self.highlight), ("hdr", &self.hdr)];
+        all.into_iter().filter_map(|(name, path)| Some((name, path.as_deref()?)))
+    }
+}
+
 impl DocumentArgs {
-    /// Opens the document. The reader notes to the observer what it had to assume.
-    pub fn open(&self, observer: &dyn Observer) -> Result<Document> {
+    /// The document of this name, read with the usual options.
+    pub fn named(document: String) -> DocumentArgs {
+        DocumentArgs {
+            document,
+            pictures: PicturesArgs::default(),
+            material: None,
+            colour_space: None,
+            samples: document::SAMPLES,
+        }
+    }
+
+    /// Where the document is; of two pictures, the first. Empty if none was named.
+    pub fn path(&self) -> &Path {
+        self.pictures.given().next().map_or_else(|| Path::new(&self.document), |(_, path)| path)
+    }
+
+    /// Opens the document. The reader notes to the observer what it had to assume. `at_hand` gives the inks, by which two
+    /// pictures are kept apart, and their library.
+    pub fn open(
+        &self,
+        at_hand: impl FnOnce() -> Result<(InkSet, Library)>,
+        observer: &dyn Observer,
+    ) -> Result<Document> {
+        if let Some(pictures) = self.pictures.pictures() {
+            let (inks, library) = at_hand()?;
+            let space = Space::half_angle(self.samples);
+            let printable = Printable::combined(&library, &inks, &space);
+            let mut document = views::open(&pictures, self.colour_space, &printable, &space, observer)?;
+            document.name.retain(|c| !c.is_control());
+            return Ok(document);
+        }
         let options = document::Options {
             material: self.material.clone(),
             colour_space: self.colour_space,

@@ -27,7 +27,7 @@ use view::mapped;
 #[derive(ClapArgs, Debug)]
 #[command(
     args_override_self = true,
-    mut_arg("document", |arg| arg.required(false).default_value("").hide_default_value(true).help(
+    mut_arg("document", |arg| arg.required_unless_present("photos").help(
         "What was printed: a document as given to `print`, with the same options; a job (.rgl); or a folder written by `layout` or \
          `simulate`"
     )),
@@ -106,7 +106,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
 
 impl Args {
     fn work(&self, observer: &dyn Observer) -> Result<Work> {
-        let path = Path::new(&self.dots.document.document);
+        let path = self.dots.document.path();
         if path.as_os_str().is_empty() {
             let Some(job) = &self.job else {
                 bail!("say what was printed: a document with the options of `print`, or --job JOB.rgl");
@@ -131,7 +131,7 @@ impl Args {
                 "{}: not the job of {} with these options ({difference}); give the options that it was printed with, \
                      --camera-marks included, or leave DOC out",
                 job.display(),
-                self.dots.document.document
+                path.display()
             );
         }
         let Some(&area) = page.laid.copies.first() else {

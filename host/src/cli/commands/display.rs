@@ -49,10 +49,10 @@ const GAP: usize = 16;
     light, eye and screen, and plays the frames. docs/guide/display.md shows it step by step."
 )]
 pub struct Args {
-    /// Images to show, one a frame: plain pictures or documents of the same pixels
+    /// Images to show, one a frame: plain pictures or documents of the same proportions
     ///
-    /// The colours of plain pictures (.png, .jpg, .tif) are taken as matte. Documents are named as for `print`. All have the same
-    /// number of pixels.
+    /// The colours of plain pictures (.png, .jpg, .tif) are taken as matte. Documents are named as for `print`. Larger ones
+    /// are averaged to the pixels of the smallest.
     #[arg(value_name = "IMAGE", required = true)]
     images: Vec<String>,
     /// Distance from one pixel of the screen to the next, such as 0.28mm
@@ -118,9 +118,9 @@ impl Image {
         if is_picture(path) {
             return Ok(Image::Matte(Matte::read(path, Space::half_angle(SAMPLES))?));
         }
-        let document =
-            DocumentArgs { document: name.into(), material: None, colour_space: None, samples: SAMPLES };
-        Ok(Image::Document(Box::new(document.open(observer)?)))
+        let document = DocumentArgs::named(name.into());
+        let at_hand = || InkArgs::of(None, None).at_hand();
+        Ok(Image::Document(Box::new(document.open(at_hand, observer)?)))
     }
 
     fn materials(&self) -> &dyn Materials {
@@ -184,6 +184,12 @@ fn size(materials: &dyn Materials) -> (usize, usize) {
     (materials.width(), materials.height())
 }
 
+/// Whether one picture covers another within a pixel of the smaller one.
+fn same_proportions(large: (usize, usize), small: (usize, usize)) -> bool {
+    let (across, down) = (large.0 * small.1, large.1 * small.0);
+    across.abs_diff(down) <= large.0.max(large.1)
+}
+
 /// An image's name without its folders, as it stands on the page.
 fn shown_name(name: &str) -> String {
     name_of(Path::new(name))
@@ -198,14 +204,19 @@ impl Args {
     /// Pixels of every image on the display.
     fn shape(&self, images: &[Image]) -> Result<(usize, usize)> {
         let sizes: Vec<(usize, usize)> = images.iter().map(|image| size(image.materials())).collect();
-        let Some(&first) = sizes.first() else { bail!("no image to show") };
-        if let Some(other) = sizes.iter().position(|&size| size != first) {
+        let Some((least, &first)) =
+            sizes.iter().enumerate().min_by_key(|(_, (width, height))| width * height)
+        else {
+            bail!("no image to show")
+        };
+        // Larger images are averaged to the pixels of the smallest.
+        if let Some(other) = sizes.iter().position(|&size| !same_proportions(size, first)) {
             bail!(
-                "{}: {} x {} pixels, but {} has {} x {}; all images of a display have the same number of pixels",
+                "{}: {} x {} pixels, but {} has {} x {}; all images of a display have the same proportions, so crop one",
                 self.images[other],
                 sizes[other].0,
                 sizes[other].1,
-                self.images[0],
+                self.images[least],
                 first.0,
                 first.1
             );

@@ -142,7 +142,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         false => None,
     };
     let (set, library) = args.inks.at_hand()?;
-    let document = args.document.open(observer)?;
+    let document = args.document.open(|| Ok((set, library.clone())), observer)?;
     let (factored, report) = stages::factored(&document, &Default::default(), observer)?;
     if let Some(report) = report {
         observer.note(&report.to_string());
@@ -196,7 +196,7 @@ impl Args {
 
     /// The folder to write and its name. It must not be the document.
     fn staged(&self) -> Result<(Staged, PathBuf)> {
-        let document = Path::new(&self.document.document);
+        let document = self.document.path();
         let target = self.output.clone().unwrap_or_else(|| {
             let name = name_of(document);
             let name = name.strip_prefix("sample:").unwrap_or(&name);
@@ -226,7 +226,7 @@ impl Args {
             result: None,
             steps: Vec::new(),
         };
-        let path = Path::new(&self.document.document).join(FILE_NAME);
+        let path = self.document.path().join(FILE_NAME);
         let Some(factored) = edited.filter(|_| path.is_file()) else { return Ok(fresh) };
         let earlier = Steps::read(&path, &factored.space, observer).context(
             "the earlier steps of the document cannot be kept; delete them to edit it as a new document",

@@ -111,7 +111,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         Args::Layers(args) => return layers::plan(args, observer),
     };
     let page = args.output.stage()?;
-    let path = Path::new(&args.work.dots.document.document);
+    let path = args.work.dots.document.path();
     let drawn = if is_job(path) {
         let mut drawn = of_job(path, &args.work.dots.inks.library()?, observer)?;
         if !args.of_documents.is_empty() {

@@ -198,7 +198,7 @@ fn refusal(program: &clap::Command, args: &[OsString]) -> Option<String> {
 /// Why a command would not take these options alone.
 fn refused_by(command: &clap::Command, program: &clap::Command, words: &[String]) -> Option<String> {
     // A preset holds no file names, so any name will do for those that the command needs.
-    let needed = command.get_arguments().filter(|arg| arg.is_required_set());
+    let needed = command.get_arguments().filter(|arg| arg.is_required_set() || arg.get_id() == "document");
     let needed = needed.map(|arg| arg.get_long().map_or("name".into(), |long| format!("--{long}=name")));
     let start = ["foilpress".to_owned(), command.get_name().to_owned()];
     let args = start.into_iter().chain(words.iter().cloned()).chain(needed).map(OsString::from);

@@ -1,5 +1,6 @@
 //! `foilpress preview`: a document or a sheet as it looks, under any light and from any direction.
 
+mod figure;
 pub mod subject;
 pub mod view;
 mod wear;
@@ -16,6 +17,7 @@ use observe::Observer;
 use press::preview::{Probe, Radiance};
 use serde_json::json;
 
+use self::figure::Figure;
 use self::subject::{PreviewSubject, png};
 use self::view::{Show, ViewArgs};
 use self::wear::{Told, WearArgs};
@@ -44,7 +46,8 @@ enum Format {
     foilpress preview sample:card -o card.png --light -40,30 --view 20,10 --curl 0.1\n  \
     foilpress preview sample:dove -o dove.exr --show document --light 0,60,0.5 --distance far\n  \
     foilpress preview sample:leaf -o near.png --zoom 40 --middle 20x30mm --seen-from 0.5m\n  \
-    foilpress preview sample:leaf -o leaf.glb                              (for other renderers)\n\n\
+    foilpress preview sample:leaf -o leaf.glb                              (for other renderers)\n  \
+    foilpress preview sample:dove -o dove.png --figure weights             (figures of the paper)\n\n\
     DOC may also be a job (.rgl), or a folder written by `halftone`, `layout` or `simulate`; these show printed dots alone.\n\
     Angles are in degrees: the first to the right, the second upwards; 0,0 is straight above the sheet. All lights have the\n\
     same strength at the middle of the sheet. A page has controls for everything and shows the document, its mixture of\n\
@@ -60,6 +63,9 @@ pub struct Args {
     output: PathBuf,
     #[command(flatten)]
     view: ViewArgs,
+    /// Draw a figure of the 2009 paper of this document instead (.png)
+    #[arg(long, value_name = "FIGURE", value_enum)]
+    figure: Option<Figure>,
     /// Pixels of the longer side of a picture or texture
     #[arg(long, value_name = "PIXELS", default_value_t = 1024, value_parser = whole(16..=8192u16))]
     pixels: u16,
@@ -96,6 +102,9 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     }
     let probe = args.view.light_probe.as_deref().map(Probe::read).transpose()?;
     let staged = Staged::file(&args.output)?;
+    if let Some(figure) = args.figure {
+        return draw_figure(args, figure, format, probe, staged, observer);
+    }
     let (what, is_page) = (args.view.what(), format == Format::Page);
     args.wear.check(what == Show::Printed || is_page, is_page)?;
     let mut shown = PreviewSubject::open(&args.dots, observer)?;
@@ -104,7 +113,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         bail!(
             "--show {}: {} has printed dots and no document; leave --show out, or name a document",
             if what == Show::Document { "document" } else { "mapped" },
-            args.dots.document.document
+            args.dots.document.path().display()
         );
     }
     let (tone, (width, height)) = if is_page {
@@ -178,6 +187,35 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     Ok(())
 }
 
+/// Writes a figure.
+fn draw_figure(
+    args: &Args,
+    figure: Figure,
+    format: Format,
+    probe: Option<Probe>,
+    staged: Staged,
+    observer: &dyn Observer,
+) -> Result<()> {
+    if format != Format::Png {
+        bail!("{}: a figure is a picture; name a .png", args.output.display());
+    }
+    let probe = probe.unwrap_or_else(|| Probe::studio(128));
+    let picture = figure::figure(figure, &args.dots, &probe, observer)?;
+    picture
+        .save_with_format(staged.path(), ImageFormat::Png)
+        .with_context(|| format!("cannot write {}", args.output.display()))?;
+    staged.commit()?;
+    let (width, height) = picture.dimensions();
+    let mut out = stdout();
+    if args.json {
+        let report = json!({ "written": args.output.display().to_string(), "pixels": [width, height] });
+        writeln!(out, "{}", serde_json::to_string_pretty(&report)?)?;
+    } else {
+        writeln!(out, "{} ({width} x {height} pixels)", args.output.display())?;
+    }
+    Ok(())
+}
+
 fn format(output: &Path) -> Result<Format> {
     let ending = output.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
     match ending.as_deref() {
@@ -209,7 +247,7 @@ fn write_glb(args: &Args, glb: &Glb, shown: &PreviewSubject, staged: Staged) -> 
         writeln!(out, "{} ({:.1} MB)", args.output.display(), bytes.len() as f64 / 1e6)?;
         writeln!(
             out,
-            "one lobe a texel: difference d {distance:.3} (root mean square), {worst:.3} at worst; 0.01 is barely visible"
+            "one lobe a texel, and a clear coat: difference d {distance:.3} (root mean square), {worst:.3} at worst; 0.01 is barely visible"
         )?;
         shown.say(&mut out)?;
     }

@@ -26,7 +26,7 @@ use halftone::metrics::{self, Look, Tone};
 use observe::Observer;
 use press::layout::Mm;
 use press::pipeline::{self, Draft, Request};
-use press::preview::{self, EYE, Panels, Probe, STANDARD_LIGHTS, Source, Spectrum, Swatch};
+use press::preview::{self, EYE, Panels, Probe, STANDARD_LIGHTS, Source, Spectrum, Swatch, TILTS};
 use sheet::Area;
 
 /// Pixels of the longer side of a panel in `sheet.png`.
@@ -77,7 +77,9 @@ impl Work {
     foilpress print my-material/ --size 120x90mm --bases 8 --to file:job.rgl\n  \
     foilpress print sample:leaf --size 60mm --repeat fill --gap 3mm --crop-marks\n  \
     foilpress print helmet.gltf --material 0 --factor sacls --intent clamp\n  \
-    foilpress print sample:card --inks all          (with foils)"
+    foilpress print sample:card --inks all          (with foils)\n  \
+    foilpress print --straight day.png --highlight night.png --inks all\n  \
+    foilpress print --hdr window.exr"
 )]
 pub struct Args {
     #[command(flatten)]
@@ -98,7 +100,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         Some(path) => Probe::read(path)?,
         None => Probe::studio(128),
     };
-    let document = args.work.dots.document.open(observer)?;
+    let document = args.work.dots.document.open(|| Ok((inks, library.clone())), observer)?;
     let places = Places::new(&document.name, &args.result, &args.deliver)?;
     let mut prepared = args.work.dots.halftone(document, inks, library, observer)?;
     // Of a fine document the mixture takes the most memory. It is given back as soon as it was measured.
@@ -157,6 +159,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         look: halftone.look.as_ref(),
         tones: &halftone.tones,
         spectrum: halftone.spectrum.as_ref(),
+        contrasts: prepared.contrasts.as_ref(),
     })?;
     output::write(&made.folder.join("report.html"), page.as_bytes())?;
     let report = report(&prepared, &pictures.fidelity, &halftone);
@@ -201,7 +204,11 @@ impl Pictures {
             })
             .collect();
         let materials = preview::materials_picture(space, &swatches, probe, BALL, observer)?;
-        let sheet = Panels::lit(&target, &printed, &STANDARD_LIGHTS, PANEL, observer)?;
+        let sheet = match prepared.contrasts {
+            None => Panels::lit(&target, &printed, &STANDARD_LIGHTS, PANEL, observer)?,
+            // Two pictures are looked at one after the other, and the eye adapts to each.
+            Some(_) => Panels::lit(&target, &printed, &TILTS, PANEL, observer)?.each_exposed(),
+        };
         Ok(Pictures { sheet, materials, fidelity })
     }
 
@@ -298,6 +305,9 @@ fn report(prepared: &DocumentDots, fidelity: &preview::FidelityReport, dots: &Ha
             "eye_m": EYE, "mean": fidelity.mean, "rmse": fidelity.rmse, "p95": fidelity.p95, "max": fidelity.max,
             "light_rmse": fidelity.light_rmse,
         },
+        "views": prepared.contrasts.as_ref().map(|c| json!({
+            "pictures": c.names, "straight": c.straight, "reflection": c.reflection,
+        })),
         "halftone": {
             "method": name(settings.halftone), "look": dots.look, "tones": dots.tones,
             "spectrum": dots.spectrum.as_ref().map(|spectrum| &spectrum.rings),

@@ -49,7 +49,7 @@ pub struct Factor {
 impl Factor {
     /// Document → bases and weight maps.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
-        let document = self.document.open(observer)?;
+        let document = self.document.open(|| InkArgs::of(None, None).at_hand(), observer)?;
         let usual = || format!("{}.foil", output::file_name(&document.name)).into();
         let staged = Staged::folder(&self.output.clone().unwrap_or_else(usual), Kind::Foil)?;
         let (factored, report) = stages::factored(&document, &self.factor.settings(), observer)?;

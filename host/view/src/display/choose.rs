@@ -1,7 +1,8 @@
 //! The stacks of a grid, where none are named.
 //!
 //! Problem: of some fifty stacks, the few whose combinations come nearest to the images.
-//! Method: greedy, then exchanges. Each round adds the stack that lowers the sum of squared distances over a sample of the
+//! Method: half of the sample is spread evenly over the image, the other half are the pixels farthest from those before in the metric,
+//! so that a rare colour counts. Greedy, then exchanges. Each round adds the stack that lowers the sum of squared distances over a sample of the
 //! images' pixels the most, with all cells of equal area; then each is exchanged for a better one while that helps. What would
 //! need more cartridges than the printer holds, or does not hold in cells of this size, is left out.
 //! Cost: candidates x (1 to 3 rounds) x stacks x sample solutions of [`Solver`]. Limits: not always the best set.
@@ -18,6 +19,8 @@ use super::{DisplayError, Grid, Screen, Solver};
 
 /// Pixels of the images that are looked at.
 const SAMPLE: usize = 64;
+/// Pixels among which the rare ones are looked for.
+const SEARCHED: usize = 4096;
 /// The most rounds of exchanges.
 const EXCHANGES: usize = 2;
 
@@ -30,19 +33,44 @@ pub struct Target<'a> {
 }
 
 impl<'a> Target<'a> {
-    /// Pixels evenly drawn from an image.
+    /// Pixels evenly drawn from an image, and the ones that differ most from all drawn before.
     pub fn sample(image: &'a dyn appearance::materials::Materials) -> Target<'a> {
         let (space, pixels) = (image.space(), image.width() * image.height());
-        let count = SAMPLE.min(pixels);
+        let count = SEARCHED.min(pixels);
         let row = |i: usize| {
             let mut row = vec![0.0; space.columns()];
             // The golden ratio: even over rows and columns alike.
             let at = (i as f64 * 0.618_033_988_749_895).fract();
-            let pixel = if count == pixels { i } else { (at * pixels as f64) as usize };
+            let pixel = if pixels <= SAMPLE { i } else { (at * pixels as f64) as usize };
             image.reflectance(pixel.min(pixels - 1), &mut row);
             row
         };
-        Target { space, rows: (0..count).map(row).collect() }
+        let mut searched: Vec<Vec<f32>> = (0..count).map(row).collect();
+        if searched.len() <= SAMPLE {
+            return Target { space, rows: searched };
+        }
+        let seen = |row: &[f32]| -> Vec<f64> {
+            let each = row.iter().zip(space.radiance()).zip(space.weight());
+            each.map(|((&f, c), w)| w * (f64::from(f).max(0.0) * c).cbrt()).collect()
+        };
+        let points: Vec<Vec<f64>> = searched.iter().map(|row| seen(row)).collect();
+        let apart = |a: usize, b: usize| -> f64 {
+            points[a].iter().zip(&points[b]).map(|(a, b)| (a - b).powi(2)).sum()
+        };
+        let mut drawn: Vec<usize> = (0..SAMPLE / 2).collect();
+        let nearest = |k: usize| drawn.iter().map(|&d| apart(k, d)).fold(f64::INFINITY, f64::min);
+        let mut away: Vec<f64> = (0..points.len()).into_par_iter().map(nearest).collect();
+        while drawn.len() < SAMPLE {
+            let far = (0..away.len()).max_by(|&a, &b| away[a].total_cmp(&away[b])).unwrap_or_default();
+            // Everything else is in the sample already.
+            if away[far] == 0.0 {
+                break;
+            }
+            away.iter_mut().enumerate().for_each(|(k, away)| *away = away.min(apart(k, far)));
+            drawn.push(far);
+        }
+        let rows = drawn.into_iter().map(|k| std::mem::take(&mut searched[k])).collect();
+        Target { space, rows }
     }
 }
 

@@ -301,6 +301,22 @@ fn the_best_stacks_are_those_the_image_is_made_of() {
     assert!(names.iter().all(|name| found.contains(name)), "{found:?}");
 }
 
+/// One pixel in four hundred is red, and the stacks that are chosen can show it.
+#[test]
+fn rare_colours_are_kept() {
+    let (library, space) = (Library::builtin(), Space::half_angle(32));
+    let looks = reflectances(&stacks(&["substrate", "K", "C", "M+Y"]), &library, &space);
+    let look = |q: usize| looks.row(q).iter().map(|&f| f as f32).collect::<Vec<f32>>();
+    let pixels =
+        (0..40 * 40).map(|pixel| look(if pixel % 400 == 399 { 3 } else { pixel * 7 % 11 % 3 })).collect();
+    let image = Rows(40, 40, space.clone(), pixels);
+    let target = Target::sample(&image);
+    assert!(target.rows.len() <= 64 && target.rows.iter().all(|row| row.len() == space.columns()));
+    let candidates = stacks(&["substrate", "K", "C", "C+K", "W", "M+Y", "MS", "MG"]);
+    let found = choose(&candidates, 4, &[target], &screen(), &library, &observe::Silent).unwrap();
+    assert!(found.contains(&"M+Y".parse().unwrap()), "{found:?}");
+}
+
 #[test]
 fn what_cannot_be_shown_is_said() {
     let library = Library::builtin();

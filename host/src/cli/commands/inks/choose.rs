@@ -32,7 +32,7 @@ pub struct Args {
 /// Runs `inks choose`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<String> {
     let (set, library) = args.inks.at_hand()?;
-    let document = args.document.open(observer)?;
+    let document = args.document.open(|| Ok((set, library.clone())), observer)?;
     let materials = document.materials();
     let printable = Printable::combined(&library, &set, materials.space());
     let settings = GamutSettings { most_cartridges: args.cartridges, ..GamutSettings::default() };

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use appearance::brdf::{Space, plot};
-use appearance::document;
 use appearance::gamut::{
     self, GamutError, GamutSettings, Gloss, Intent, LIGHT, LeftOut, MaterialReport, Printable,
 };
@@ -61,13 +60,8 @@ struct Basis {
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<String> {
     let inks = InkArgs::of(args.inks.clone(), Some(args.library.clone()));
     let (set, library) = inks.at_hand()?;
-    let opening = DocumentArgs {
-        document: args.document.clone(),
-        material: None,
-        colour_space: None,
-        samples: document::SAMPLES,
-    };
-    let document = opening.open(observer)?;
+    let opening = DocumentArgs::named(args.document.clone());
+    let document = opening.open(|| Ok((set, library.clone())), observer)?;
     let (factored, _) = stages::factored(&document, &args.factor.settings(), observer)?;
     let space = &factored.space;
     let printable = Printable::combined(&library, &set, space);

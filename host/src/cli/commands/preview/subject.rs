@@ -64,7 +64,7 @@ pub struct Page {
 impl PreviewSubject {
     /// What the argument names: a document, or printed dots.
     pub fn open(work: &DotsArgs, observer: &dyn Observer) -> Result<PreviewSubject> {
-        let path = Path::new(&work.document.document);
+        let path = work.document.path();
         if let Some(dots) = printed(path, observer)? {
             let name = printed_name(path);
             let library = work.inks.library()?;
@@ -204,14 +204,18 @@ fn counted(dots: usize) -> String {
 /// came without any. Pages are shown to others, so a path is only its last part.
 fn replay(prepared: &DocumentDots, work: &DotsArgs) -> String {
     let asked = &work.document;
-    let last = Path::new(&asked.document).file_name().map(|name| name.to_string_lossy().into_owned());
+    let last = asked.path().file_name().map(|name| name.to_string_lossy().into_owned());
     let name = last.unwrap_or_else(|| asked.document.clone());
     let edit = |foil: &str| format!("foilpress edit {} --steps steps.toml -o edited.foil", word(foil));
-    if prepared.document.as_factored().is_some() {
+    let file = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let pictures: Vec<String> =
+        asked.pictures.given().map(|(option, path)| format!("--{option} {}", word(&file(path)))).collect();
+    if prepared.document.as_factored().is_some() && pictures.is_empty() {
         return edit(&name);
     }
     let found = prepared.factoring();
-    let mut line = format!("foilpress factor {}", word(&name));
+    let subject = if pictures.is_empty() { word(&name) } else { pictures.join(" ") };
+    let mut line = format!("foilpress factor {subject}");
     let mut option = |name: &str, value: Option<String>| {
         if let Some(value) = value {
             line.push_str(&format!(" --{name} {}", word(&value)));

@@ -12,7 +12,7 @@ use appearance::gamut::{DistanceUncertainty, MaterialReport};
 use halftone::metrics::{Look, Tone};
 use press::html::{self, escape};
 use press::job::plan::{Plan, grouped};
-use press::preview::{FidelityReport, Spectrum, mix_in_words};
+use press::preview::{Contrasts, FidelityReport, Spectrum, mix_in_words};
 
 /// Materials whose curves are drawn: those that stand for most of the document.
 const DRAWN: usize = 8;
@@ -46,6 +46,8 @@ pub struct Subject<'a> {
     pub tones: &'a [Tone],
     /// Its spectrum, if it has one.
     pub spectrum: Option<&'a Spectrum>,
+    /// How well each of two pictures is seen, if it prints two.
+    pub contrasts: Option<&'a Contrasts>,
 }
 
 /// The page.
@@ -83,6 +85,9 @@ fn write(subject: &Subject, plots: &[(usize, String)], page: &mut String) -> fmt
         plan.passes.len(),
         fidelity.mean
     )?;
+    if let Some(contrasts) = subject.contrasts {
+        writeln!(page, "<p>Two pictures: {}.</p>", escape(&contrasts.to_string()))?;
+    }
     write!(
         page,
         "<h2>The sheet</h2>\n<p>Document above, print below, under four lights, and the dots under a lens. On <a href=\"sheet.html\">the sheet's own page</a> \
@@ -325,6 +330,7 @@ mod tests {
             look: None,
             tones: &[],
             spectrum: spectrum.as_ref(),
+            contrasts: None,
         };
         let text = page(&subject).unwrap();
         assert!(text.contains("&lt;script&gt;alert(1)"));

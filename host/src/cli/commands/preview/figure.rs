@@ -1,0 +1,100 @@
+//! `foilpress preview --figure`: figures of the 2009 paper, of any document.
+
+use std::borrow::Cow;
+
+use anyhow::Result;
+use appearance::brdf::{Table, reflectances};
+use appearance::factor::Factored;
+use appearance::gamut::{self, GamutSettings, Gloss, Intent, Mapped, Printable};
+use clap::ValueEnum;
+use image::RgbImage;
+use inks::Library;
+use observe::Observer;
+use press::preview::figures::{SIX_LIGHTS, balls_picture, bases_alone, weights_picture};
+use press::preview::{Panels, Probe, Source};
+use sheet::Area;
+
+use crate::cli::arguments::document_dots::DotsArgs;
+
+/// Which one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Figure {
+    /// Each basis as a ball above its weight map (figure 4)
+    Weights,
+    /// Bases as balls in four columns: the document's, the stacks', clamped, and mapped with their differences kept (figure 5)
+    Balls,
+    /// Document over print under six lights, from above down to 15 degrees (figure 11)
+    Lights,
+}
+
+/// Draws a figure of a document.
+pub fn figure(figure: Figure, work: &DotsArgs, probe: &Probe, observer: &dyn Observer) -> Result<RgbImage> {
+    let prepared = work.document_dots(observer)?;
+    let name = &prepared.document.name;
+    if figure == Figure::Lights {
+        let dots = &prepared.halftoned.dots;
+        let space = prepared.document.materials().space();
+        let stacks = reflectances(dots.stacks(), &prepared.library, space);
+        let print = Source::Print { dots, space, stacks: &stacks, area: Area::whole(dots) };
+        let target = match prepared.document.as_factored() {
+            Some(factored) => Source::Factored(factored),
+            None => Source::Document(prepared.document.materials()),
+        };
+        let panels = Panels::lit(&target, &print, &SIX_LIGHTS, 300, observer)?.without_dots();
+        return Ok(panels.picture(name, &[])?);
+    }
+    let bases = prepared.bases(observer)?;
+    if figure == Figure::Weights {
+        return Ok(weights_picture(name, &bases, probe, observer)?);
+    }
+    // Each basis as a document of its own: what the inks come nearest to, and what keeps their differences.
+    let alone = bases_alone(&bases)?;
+    let printable = Printable::combined(&prepared.library, &prepared.settings.inks, &bases.space);
+    let map = |intent, gloss| -> Result<Mapped> {
+        let settings = GamutSettings { intent, gloss, eye: None, ..prepared.settings.gamut.clone() };
+        let bases = || Ok::<_, gamut::GamutError>(Cow::Borrowed(&alone));
+        Ok(gamut::map(&alone, bases, &printable, &settings, &observe::Silent)?)
+    };
+    let clamped = map(Intent::Clamp, Gloss::Keep)?;
+    let mapped = map(Intent::Basis, GamutSettings::default().gloss)?;
+    let columns = [
+        ("document", alone.bases.clone()),
+        ("stacks in use", stacks(&mapped, &prepared.library, &alone)),
+        ("clamped", printed(&clamped, &prepared.library, &alone)),
+        ("mapped", printed(&mapped, &prepared.library, &alone)),
+    ];
+    Ok(balls_picture(name, &bases.space, &columns, probe, observer)?)
+}
+
+/// What the mixture of each pixel reflects.
+fn printed(mapped: &Mapped, library: &Library, document: &Factored) -> Table {
+    let curves = reflectances(&mapped.mix.stacks, library, &document.space);
+    let mut rows = Table::new(document.space.columns());
+    let mut shares = vec![0.0; curves.len()];
+    for pixel in 0..document.bases.len() {
+        mapped.mix.shares(pixel, &mut shares);
+        let mut row = vec![0.0; document.space.columns()];
+        for (share, curve) in shares.iter().zip(curves.rows()) {
+            row.iter_mut().zip(curve).for_each(|(sum, f)| *sum += share * f);
+        }
+        rows.push(&row);
+    }
+    rows
+}
+
+/// The stacks that take most of the mixtures, as many as there are bases.
+fn stacks(mapped: &Mapped, library: &Library, document: &Factored) -> Table {
+    let curves = reflectances(&mapped.mix.stacks, library, &document.space);
+    let mut total = vec![0.0; curves.len()];
+    let mut shares = vec![0.0; curves.len()];
+    for pixel in 0..document.bases.len() {
+        mapped.mix.shares(pixel, &mut shares);
+        total.iter_mut().zip(&shares).for_each(|(sum, share)| *sum += share);
+    }
+    let mut order: Vec<usize> = (0..curves.len()).filter(|&k| total[k] > 0.0).collect();
+    order.sort_by(|&a, &b| total[b].total_cmp(&total[a]));
+    order.truncate(document.bases.len());
+    let mut rows = Table::new(document.space.columns());
+    order.into_iter().for_each(|k| rows.push(curves.row(k)));
+    rows
+}
