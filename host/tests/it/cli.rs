@@ -156,7 +156,7 @@ fn a_name_that_is_not_utf8_works_or_is_said_to_be_the_trouble() {
     let output = command.arg(name).output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
-    assert!(said.contains("<DOC>") && said.contains("rename the file"), "{said}");
+    assert!(said.contains("[DOC]") && said.contains("rename the file"), "{said}");
 }
 
 #[test]

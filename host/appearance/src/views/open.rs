@@ -292,17 +292,18 @@ fn factored(
     printable: &Printable,
     space: &Space,
 ) -> Result<(Factored, Vec<[f64; 2]>), WeightError> {
-    let rows: [[Vec<f64>; 2]; 2] = [0, 1].map(|i| [0, 1].map(|j| limits.row(printable, i, j)));
+    // First dark and bright in the reflection, then straight on.
+    let rows: [[Vec<f64>; 2]; 2] = [0, 1].map(|j| [0, 1].map(|i| limits.row(printable, i, j)));
     let bits: &[[usize; 3]] = match straight.colours {
         None => &[[0; 3], [1; 3]],
         Some(_) => &[[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1], [1, 1, 1]],
     };
     let (mut bases, mut shown) = (Table::new(space.columns()), Vec::new());
-    for reflection in 0..2 {
+    for (reflection, rows) in [0.0, 1.0].into_iter().zip(&rows) {
         for bits in bits {
-            let row: Vec<f64> = (0..space.columns()).map(|k| rows[bits[k % 3]][reflection][k]).collect();
+            let row: Vec<f64> = (0..space.columns()).map(|k| rows[bits[k % 3]][k]).collect();
             bases.push(&row);
-            shown.push([luminance(bits.map(|bit| bit as f64)), reflection as f64]);
+            shown.push([luminance(bits.map(|bit| bit as f64)), reflection]);
         }
     }
     let planes: Vec<Plane> = match &straight.colours {
