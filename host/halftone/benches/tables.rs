@@ -42,7 +42,11 @@ fn side(minimum: u16) -> usize {
 /// The patches of the table: name, stacks, minima, shares of each stack at (u, v) of 0 to 1.
 type Patch = (&'static str, [&'static str; 5], [u16; 5], fn(f64, f64) -> [f64; 5]);
 
-const PATCHES: [Patch; 10] = [
+const PATCHES: [Patch; 12] = [
+    ("ramp of 4 inks; 8", ["substrate", "C", "M", "Y", "K"], [8; 5], |u, v| {
+        [0.0, (1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v]
+    }),
+    ("K ramp; 8", ["substrate", "K", "C", "M", "Y"], [8; 5], |u, _| [1.0 - u, u, 0.0, 0.0, 0.0]),
     ("ramp of 4 inks", ["substrate", "C", "M", "Y", "K"], [9; 5], |u, v| {
         [0.0, (1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v]
     }),

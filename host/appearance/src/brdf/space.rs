@@ -11,9 +11,12 @@
 //! quadrature.
 //! Cost: O(columns) per distance. Limits: values below 0 count as 0; cube roots of radiance do not add, only reflectance does.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use inks::Curve;
+
+/// Half angles beyond this one are away from the highlight: a lobe as wide as alpha .35 has a tenth of its peak here.
+const DARK: f64 = FRAC_PI_4;
 
 /// The meaning of the columns of a tabulated BRDF. See the module documentation.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +25,7 @@ pub struct Space {
     weight: Vec<f64>,
     angles: Vec<f64>,
     light: Vec<f64>,
+    dark: Vec<f64>,
 }
 
 /// Why some numbers are not a tabulation.
@@ -68,7 +72,11 @@ impl Space {
         // 4 sin 2t cos 2t = 8 sin t cos t cos 2t up to 45 degrees, by the same rule.
         let light = measure.iter().zip(&angles).map(|(&m, &t)| 8.0 * m * (2.0 * t).cos());
         let light = light.take_while(|&q: &f64| q > 0.0).collect();
-        Space { angles, light, ..Space::interleave(&cosine, &measure) }
+        let beyond = |&t: &f64| if t > DARK { 1.0 } else { 0.0 };
+        let all: f64 = measure.iter().zip(&angles).map(|(m, t)| m * beyond(t)).sum();
+        let share = |(m, t): (&f64, &f64)| if all > 0.0 { m * beyond(t) / all } else { 0.0 };
+        let dark = measure.iter().zip(&angles).map(share).collect();
+        Space { angles, light, dark, ..Space::interleave(&cosine, &measure) }
     }
 
     /// Any tabulation: for each configuration, the factor from reflectance to reflected radiance (the cosine at the
@@ -91,6 +99,7 @@ impl Space {
             weight: measure.iter().flat_map(|&m| [m.sqrt(); 3]).collect(),
             angles: Vec::new(),
             light: Vec::new(),
+            dark: Vec::new(),
         }
     }
 
@@ -140,6 +149,12 @@ impl Space {
     /// For each configuration, its share in the [albedo](Space::albedo); those left out at the end have none.
     pub fn light(&self) -> &[f64] {
         &self.light
+    }
+
+    /// For each configuration, its share in the mean reflectance away from the highlight, which is what most of a glossy ball
+    /// shows where no lamp is. Empty in spaces without half angles.
+    pub fn dark(&self) -> &[f64] {
+        &self.dark
     }
 
     /// The reflectance (1/sr) of the matt surface that returns as much of the light from the normal as this row, channel by

@@ -126,9 +126,9 @@ const SETTLED: f64 = 1e-3;
 const CORNER_AXES: usize = 10;
 
 /// The largest distance of a basis of SACLS outside the hull of the document, in units of the document's spread. Measured on the
-/// samples, with three and four bases: at most 0.12 where the bases look like materials (leaf, flange), 0.37 to 7 where curves
+/// samples, with three and four bases: at most 0.12 where the bases look like materials (leaf, flange), 0.28 to 7 where curves
 /// have holes (dove, card).
-const NEAR: f64 = 0.25;
+pub(super) const NEAR: f64 = 0.2;
 
 struct Learnt {
     /// The sample's principal axes.

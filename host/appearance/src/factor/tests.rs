@@ -8,7 +8,7 @@ use super::*;
 use crate::brdf::Space;
 use crate::materials::Materials;
 use crate::weights::ONE;
-use observe::Silent;
+use observe::{Observer, Silent};
 
 /// Documents given as rows.
 struct Rows {
@@ -420,18 +420,39 @@ proptest! {
 /// The dove's bases of SACLS have holes where their highlights are; the leaf's are near its materials.
 #[test]
 fn bases_far_from_the_document_give_way_to_means_of_its_materials() {
+    /// How far outside the farthest basis is said to be.
+    #[derive(Default)]
+    struct Farthest(std::sync::Mutex<Option<f64>>);
+    impl Observer for Farthest {
+        fn begin(&self, _: &str, _: u64) {}
+        fn advance(&self, _: u64) {}
+        fn end(&self) {}
+        fn note(&self, text: &str) {
+            let number = text
+                .split_once("outside the document's materials by ")
+                .and_then(|(_, rest)| rest.split(' ').next().and_then(|number| number.parse().ok()));
+            if number.is_some() {
+                *self.0.lock().unwrap() = number;
+            }
+        }
+    }
+    let said = Farthest::default();
     let sampled = |name: &str, bases| {
         let document =
             crate::document::open(&format!("sample:{name}"), &Default::default(), &Silent).unwrap();
         let settings =
             FactorSettings { method: Method::Sacls, bases: Some(bases), ..FactorSettings::default() };
-        factor(document.materials(), &settings, &Silent).unwrap().report
+        factor(document.materials(), &settings, &said).unwrap().report
     };
     let dove = sampled("dove", 3);
     assert_eq!(dove.method, Method::Kmeans);
     assert!(dove.excursion.iter().all(|&e| e < 1e-3), "{:?}", dove.excursion);
     let leaf = sampled("leaf", 3);
     assert_eq!(leaf.method, Method::Sacls, "{:?}", leaf.excursion);
+    // A limit a fifth lower or higher parts the same documents.
+    assert!(leaf.excursion.iter().all(|&e| e < 0.8 * factoring::NEAR), "{:?}", leaf.excursion);
+    let farthest = said.0.lock().unwrap().unwrap();
+    assert!(farthest > 1.2 * factoring::NEAR, "{farthest}");
 }
 
 /// The comparison behind the default method, on a real document with many materials.

@@ -1,5 +1,7 @@
 //! The claims of section 4.1, figure 5's ladder, the limits, and the intents against each other.
 
+mod dark;
+
 use inks::{Curve, InkSet, Library, Stack};
 use proptest::prelude::*;
 use protocol::ink::Ink;
@@ -452,15 +454,15 @@ fn every_clamped_pixel_is_its_own_best() {
     let (all, used) = (hull(&printable.curves), hull(&used));
     let mut mixer = crate::solve::Mixer::new();
     let mut row = vec![0f32; space.columns()];
+    let mut shares = vec![0.0; mapped.mix.stacks.len()];
     let (mut with_all, mut with_used) = (0.0, 0.0);
     for pixel in (0..380).step_by(3) {
         pixels.reflectance(pixel, &mut row);
         let target: Vec<f64> = row.iter().map(|&f| f64::from(f)).collect();
         with_all += mixer.best(&all, &all.target(&target).unwrap()).unwrap().fit.distance.powi(2);
         let best = mixer.best(&used, &used.target(&target).unwrap()).unwrap().fit.distance;
-        let printed = printed_row(&mapped.mix, &printable, pixel);
-        let light = LIGHT * space.light_distance(&target, &printed);
-        let d = space.distance(&target, &printed).hypot(light);
+        mapped.mix.shares(pixel, &mut shares);
+        let d = used.distance(&shares, &used.target(&target).unwrap());
         // Price of layers, pruning and rounding of shares.
         assert!(d >= best - 1e-9 && d < best + 5e-4, "pixel {pixel}: {d} {best}");
         with_used += best.powi(2);

@@ -11,6 +11,7 @@
 use crate::brdf::{Space, Table};
 
 use super::columns::Columns;
+use super::hue::{Aim, Hue};
 use super::root::inverse_cbrt;
 use super::simplex::SimplexError;
 use super::vector::add_scaled;
@@ -71,6 +72,7 @@ pub struct Hull {
     radiance: Vec<f64>,
     /// For each configuration, the factor from radiance to its share in the albedo; empty without a weight for light.
     light: Vec<f64>,
+    pub(super) hue: Option<Hue>,
     pub(super) weight: Vec<f64>,
     pub(super) rows: Table,
     /// The same rows by column.
@@ -84,6 +86,8 @@ pub struct Hull {
 pub struct Target {
     pub(super) radiance: Vec<f64>,
     pub(super) root: Vec<f64>,
+    /// Its hue away from the highlight, if the hull knows it.
+    pub(super) hue: Option<Aim>,
 }
 
 impl Target {
@@ -134,6 +138,11 @@ impl Hull {
         if !light_of_radiance.is_empty() {
             weight.extend([light; 3]);
         }
+        let hue = if light_of_radiance.is_empty() { None } else { Hue::new(space, weight.len()) };
+        if hue.is_some() {
+            // Hue is compared by itself.
+            weight.extend([0.0; 3]);
+        }
         // Columns of no weight, so that the loops over them have no rest.
         weight.resize(weight.len().next_multiple_of(LANES), 0.0);
         let mut rows = Table::new(weight.len());
@@ -148,7 +157,9 @@ impl Hull {
                 radiance.push(f * c);
                 brightest = brightest.max(f * c);
             }
+            let dark = hue.as_ref().map(|hue| hue.mean(&radiance));
             append_albedo(&light_of_radiance, &mut radiance);
+            radiance.extend(dark.into_iter().flatten());
             radiance.resize(weight.len(), 0.0);
             rows.push(&radiance);
         }
@@ -156,6 +167,7 @@ impl Hull {
         Ok(Hull {
             radiance: space.radiance().to_vec(),
             light: light_of_radiance,
+            hue,
             weight,
             by_column: Columns::of_rows(&rows),
             rows,
@@ -169,9 +181,31 @@ impl Hull {
         let mut rows = Table::new(self.rows.columns());
         stacks.iter().for_each(|&k| rows.push(self.rows.row(k)));
         let price = stacks.iter().map(|&k| self.price[k]).collect();
-        let (radiance, light) = (self.radiance.clone(), self.light.clone());
-        let (weight, darkest) = (self.weight.clone(), self.darkest);
-        Hull { radiance, light, weight, by_column: Columns::of_rows(&rows), rows, price, darkest }
+        let by_column = Columns::of_rows(&rows);
+        let (radiance, light, hue) = (self.radiance.clone(), self.light.clone(), self.hue.clone());
+        Hull {
+            radiance,
+            light,
+            hue,
+            weight: self.weight.clone(),
+            by_column,
+            rows,
+            price,
+            darkest: self.darkest,
+        }
+    }
+
+    /// The same without hue in the dark.
+    #[cfg(test)]
+    pub(crate) fn blind_to_hue(self) -> Hull {
+        self.with_hue(0.0)
+    }
+
+    /// The same with hue weighed by a multiple of what it is.
+    #[cfg(test)]
+    pub(crate) fn with_hue(mut self, times: f64) -> Hull {
+        self.hue.iter_mut().for_each(|hue| hue.weight *= times);
+        self
     }
 
     /// Number of stacks.
@@ -215,6 +249,7 @@ impl Hull {
         target
             .radiance
             .extend(reflectance.zip(&self.radiance).map(|(f, c)| if f < 0.0 { 0.0 } else { f * c }));
+        target.hue = self.hue.as_ref().map(|hue| hue.aim(hue.mean(&target.radiance)));
         append_albedo(&self.light, &mut target.radiance);
         target.radiance.resize(self.columns(), 0.0);
         target.root.resize(self.columns(), 0.0);
@@ -237,8 +272,8 @@ impl Hull {
         }
     }
 
-    /// The distance d between a mixture and a target.
-    pub(super) fn distance(&self, weights: &[f64], target: &Target) -> f64 {
+    /// The distance between a mixture and a target, with light and hue in the dark.
+    pub(crate) fn distance(&self, weights: &[f64], target: &Target) -> f64 {
         let mut mix = vec![0.0; self.columns()];
         self.mix(weights, &mut mix);
         let mut sum = 0.0;
@@ -247,6 +282,11 @@ impl Hull {
             let r = inverse_cbrt(f);
             let d = w * (f * r * r - root);
             sum += d * d;
+        }
+        if let (Some(hue), Some(aim)) = (&self.hue, &target.hue) {
+            let (mut missed, mut pull) = ([0.0; 3], [0.0; 3]);
+            aim.compare(std::array::from_fn(|c| mix[hue.first + c]), &mut missed, &mut pull);
+            sum += missed.iter().map(|m| m * m).sum::<f64>();
         }
         sum.sqrt()
     }

@@ -2,7 +2,8 @@
 //!
 //! Problem: minimise `E(a) = sum_j W_j^2 (cbrt((Aa)_j) - cbrt(t_j))^2 + p'a` over the simplex, where the rows of A
 //! are the stacks' reflected radiances, t is the target's, W are the metric's weights and p is a small price of each stack
-//! that breaks ties toward fewer layers. The albedos may be further columns ([`Hull::new`]).
+//! that breaks ties toward fewer layers. The albedos may be further columns ([`Hull::new`]), beside hue in the dark
+//! ([`super::hue`]).
 //! Method: sequential quadratic steps. At a, the metric is replaced by its Gauss-Newton model, with the exact second
 //! derivative where that is positive. [`Simplex`] minimises the model exactly over the stacks in use and those whose
 //! gradient shows that they would help; Armijo's rule halves the step. The search ends when the gap is small enough or the
@@ -14,6 +15,7 @@
 //! Source: eq. 1 of the 2009 paper (section 4.1) with the metric of its appendix.
 
 use super::gram::Gram;
+use super::hue::Missed;
 use super::hull::{DARKEST, Hull, MixtureError, Target};
 use super::root::inverse_cbrt;
 use super::simplex::{Simplex, SimplexError, frank_wolfe_gap};
@@ -34,11 +36,13 @@ const AGREEMENT: f64 = 1e-6;
 /// How good a mixture is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
-    /// Distance between mixture and target in the metric of the hull, light included.
+    /// Distance between mixture and target in the metric of the hull, with light and hue in the dark.
     pub distance: f64,
     /// The part of it that eqs. 2-3 see: distance d.
     pub curve: f64,
     /// Frank-Wolfe gap in squared distance: where E is convex, no mixture has a value of `d^2 + p'a` lower by more than this.
+    /// With hue in the dark, which is not convex, that holds for all the rest if the search went as far as possible; otherwise
+    /// it says how nearly the search was done.
     pub gap: f64,
     /// Steps taken.
     pub steps: u32,
@@ -74,6 +78,8 @@ pub struct Mixer {
     /// Per column: residual times slope, and the root of the model's curvature.
     pull: Vec<f64>,
     stiffness: Vec<f64>,
+    /// What the trial mixture misses of the target's hue in the dark.
+    hue: Missed,
     /// Half the gradient, one value per stack.
     slope: Vec<f64>,
     /// Whether each stack is excluded.
@@ -104,6 +110,7 @@ impl Mixer {
             residual: Vec::new(),
             pull: Vec::new(),
             stiffness: Vec::new(),
+            hue: Missed::default(),
             slope: Vec::new(),
             closed: Vec::new(),
             working: Vec::new(),
@@ -303,6 +310,7 @@ impl Mixer {
                 }
             }
         };
+        let gap = if enough == 0.0 { gap.max(self.gap_without_hue(hull, a)) } else { gap };
         if !gap.is_finite() {
             return Err(SimplexError::NotFinite.into());
         }
@@ -326,6 +334,15 @@ impl Mixer {
         }
     }
 
+    /// The gap of the part of the objective that is convex, at the mixture that was found: what a certificate can say.
+    #[inline(always)]
+    fn gap_without_hue(&mut self, hull: &Hull, a: &[f64]) -> f64 {
+        let Some(hue) = &hull.hue else { return 0.0 };
+        self.pull[hue.first..][..3].fill(0.0);
+        self.price(hull);
+        2.0 * frank_wolfe_gap(&self.slope, a)
+    }
+
     /// Minimises the quadratic model over the working stacks; `working_weights` receives their weights. Its curvature is
     /// Gauss-Newton's times `(2 cbrt t - cbrt f) / cbrt f`, the exact second derivative, limited to 0.25..9.
     #[inline(always)]
@@ -344,6 +361,9 @@ impl Mixer {
             let scaled = &mut self.scaled[i * m..][..m];
             for ((x, f), s) in scaled.iter_mut().zip(hull.rows.row(k)).zip(&self.stiffness) {
                 *x = f * s;
+            }
+            if let Some(hue) = &hull.hue {
+                self.hue.scale(&hull.rows.row(k)[hue.first..][..3], &mut scaled[hue.first..][..3]);
             }
         }
         let scaled = &self.scaled;
@@ -436,6 +456,10 @@ impl Mixer {
             residual[j] = weight[j] * (f * r2 - t[j]);
             let tangent = weight[j] * r2 * (1.0 / 3.0);
             pull[j] = residual[j] * tangent;
+        }
+        if let (Some(hue), Some(aim)) = (&hull.hue, &target.hue) {
+            let dark = std::array::from_fn(|c| mix[hue.first + c]);
+            self.hue = aim.compare(dark, &mut residual[hue.first..][..3], &mut pull[hue.first..][..3]);
         }
         dot(residual, residual)
     }

@@ -6,6 +6,7 @@
 mod batch;
 mod columns;
 mod gram;
+mod hue;
 mod hull;
 mod mixture;
 mod perceptual;

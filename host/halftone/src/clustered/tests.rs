@@ -2,6 +2,7 @@
 
 mod borders;
 mod flat;
+mod never_grainier;
 mod parts;
 
 use super::super::contrast_sensitivity::{Eye, errors_seen, peak, swing};

@@ -21,7 +21,7 @@ use press::preview::sphere::under_probe;
 use press::preview::{Probe, Radiance, mix_in_words};
 
 /// One material on one pixel.
-struct One(Space, Vec<f32>);
+pub struct One(pub Space, pub Vec<f32>);
 
 impl Materials for One {
     fn width(&self) -> usize {
@@ -38,7 +38,8 @@ impl Materials for One {
     }
 }
 
-fn surface(space: &Space, diffuse: [f32; 3], f0: [f32; 3], alpha: f32) -> Vec<f64> {
+/// A row of a surface.
+pub fn surface(space: &Space, diffuse: [f32; 3], f0: [f32; 3], alpha: f32) -> Vec<f64> {
     space.row(&Surface { diffuse, f0, alpha }.curve(space.angles()))
 }
 
@@ -84,7 +85,7 @@ pub fn errors_of_balls(space: &Space, both: &Table, probes: &[Probe; 3]) -> [f64
 }
 
 /// The materials of the tables.
-fn documents(data: &Path, space: &Space) -> Vec<(String, Table)> {
+pub fn documents(data: &Path, space: &Space) -> Vec<(String, Table)> {
     let silver = [0.972, 0.960, 0.915];
     let mut documents: Vec<(String, Table)> = Vec::new();
     let mut one = |name: &str, row: Vec<f64>| {

@@ -1,7 +1,8 @@
 //! Tables for decisions on the metric, in words and figures: no times.
 //!
-//! `FOILPRESS_DATA=... cargo bench -p foilpress-press --bench metric -- weights`, or `bounds`, `widths`, `prints`.
+//! `FOILPRESS_DATA=... cargo bench -p foilpress-press --bench metric -- weights`, or `bounds`, `widths`, `balls`, `prints`.
 
+mod balls;
 mod light;
 mod prints;
 
@@ -17,10 +18,13 @@ fn main() {
             "weights" => light::weights(&data),
             "bounds" => light::bounds(&data),
             "widths" => light::widths(&data),
+            "balls" => balls::balls(&data),
             "prints" => prints::prints(&data),
             // Cargo's own.
             "--bench" => {}
-            other => eprintln!("there is no table `{other}`; there are weights, bounds, widths, prints"),
+            other => {
+                eprintln!("there is no table `{other}`; there are weights, bounds, widths, balls, prints")
+            }
         }
     }
 }

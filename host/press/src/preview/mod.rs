@@ -7,7 +7,7 @@
 //!
 //! [`sphere`] lights balls, [`Probe`] is the light around them, [`Source`] gives the reflectance of a document or a
 //! sheet at each pixel, [`flat()`] lights it, [`fidelity()`] compares two sources as the eye does, and
-//! [`Panels`] and [`materials_picture()`] lay the results out.
+//! [`gloss`] says what a gloss meter reads, [`Panels`] and [`materials_picture()`] lay the results out.
 
 mod canvas;
 mod contrasts;
@@ -16,6 +16,7 @@ mod fidelity;
 pub mod figures;
 mod fine;
 mod flat;
+pub mod gloss;
 pub mod inks;
 mod light_tree;
 mod materials_picture;

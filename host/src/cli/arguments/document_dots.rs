@@ -9,11 +9,13 @@ use crate::cli::arguments::{DocumentArgs, FactorArgs, GamutArgs, HalftoneArg, In
 use appearance::brdf::reflectances;
 use appearance::document::Document;
 use appearance::factor::{self, Factored};
-use appearance::gamut::{self, Gain, Intent};
+use appearance::gamut::{self, Gain, Intent, Printable};
 use observe::Observer;
 use press::layout::Layout;
 use press::pipeline::document::{self, Halftoned, Settings};
+use press::preview::gloss::{self, Gloss};
 use press::preview::{self, Contrasts, EYE, Source};
+use rayon::prelude::*;
 use sheet::{Area, Size};
 
 /// Bases of a document whose print needs none, so that the picture of it is close.
@@ -53,6 +55,22 @@ pub struct DocumentDots {
 }
 
 impl DocumentDots {
+    /// Gloss of each material of the mapping, in its order.
+    pub fn gloss(&self) -> Vec<Gloss> {
+        let space = self.document.materials().space();
+        let lowest = gloss::lowest_peak(&Printable::combined(&self.library, &self.settings.inks, space));
+        let materials = self.halftoned.mapped.report.materials.par_iter();
+        materials.map(|material| Gloss::of(space, material, lowest)).collect()
+    }
+
+    /// What there is to say of the document beside the plan: what was assumed, and its gloss.
+    pub fn notes(&self, gloss: &[Gloss]) -> Vec<String> {
+        let materials = &self.halftoned.mapped.report.materials;
+        let shares: Vec<(f64, Gloss)> =
+            materials.iter().map(|m| m.share).zip(gloss.iter().copied()).collect();
+        self.document.notes.iter().cloned().chain(gloss::sentences(&shares)).collect()
+    }
+
     /// How the document's bases for pictures of it are found, unless it came with bases.
     pub fn factoring(&self) -> factor::FactorSettings {
         let uses_bases = self.halftoned.mapped.report.intent.uses_bases();

@@ -26,6 +26,7 @@ use halftone::metrics::{self, Look, Tone};
 use observe::Observer;
 use press::layout::Mm;
 use press::pipeline::{self, Draft, Request};
+use press::preview::gloss::Gloss;
 use press::preview::{self, EYE, Panels, Probe, STANDARD_LIGHTS, Source, Spectrum, Swatch, TILTS};
 use sheet::Area;
 
@@ -52,7 +53,7 @@ impl Work {
     pub fn draft(&self, observer: &dyn Observer) -> Result<Draft> {
         let prepared = self.dots.document_dots(observer)?;
         let mut draft = pipeline::draft(&self.request(&prepared), observer)?;
-        draft.plan.notes.clone_from(&prepared.document.notes);
+        draft.plan.notes = prepared.notes(&prepared.gloss());
         Ok(draft)
     }
 
@@ -105,20 +106,13 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let mut prepared = args.work.dots.halftone(document, inks, library, observer)?;
     // Of a fine document the mixture takes the most memory. It is given back as soon as it was measured.
     let mix = prepared.halftoned.mapped.mix.take();
+    let gloss = prepared.gloss();
+    let notes = prepared.notes(&gloss);
     let ground = args.result.background.unwrap_or_default();
     // Some steps to a job are one thread's. What does not depend on it is looked at beside them.
     let beside = Beside(observer);
     let (made, seen) = rayon::join(
-        || {
-            printing::make(
-                &args.work.request(&prepared),
-                &prepared.document.notes,
-                &[],
-                places,
-                ground,
-                observer,
-            )
-        },
+        || printing::make(&args.work.request(&prepared), &notes, &[], places, ground, observer),
         || {
             let rest = || {
                 let halftone = Halftone::measured(&prepared, &mix, &beside)?;
@@ -153,6 +147,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         plan: &made.job.draft.plan,
         space: prepared.document.materials().space(),
         materials: &prepared.halftoned.mapped.report.materials,
+        gloss: &gloss,
         kind: kind(&prepared),
         fidelity: (&pictures.fidelity, EYE),
         doubt,
@@ -162,7 +157,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         contrasts: prepared.contrasts.as_ref(),
     })?;
     output::write(&made.folder.join("report.html"), page.as_bytes())?;
-    let report = report(&prepared, &pictures.fidelity, &halftone);
+    let report = report(&prepared, &gloss, &pictures.fidelity, &halftone);
     output::write(&made.folder.join("sheet.html"), looked_at.html.as_bytes())?;
     made.finish(report, (&advice, "report.html"), &args.result, &args.deliver, observer)
 }
@@ -257,13 +252,19 @@ impl Halftone {
 }
 
 /// What the report of a document says beside what every report says.
-fn report(prepared: &DocumentDots, fidelity: &preview::FidelityReport, dots: &Halftone) -> Value {
+fn report(
+    prepared: &DocumentDots,
+    gloss: &[Gloss],
+    fidelity: &preview::FidelityReport,
+    dots: &Halftone,
+) -> Value {
     let DocumentDots { document, settings, halftoned, .. } = prepared;
     let mapped = &halftoned.mapped.report;
     let materials: Vec<_> = mapped
         .materials
         .iter()
-        .map(|material| {
+        .zip(gloss)
+        .map(|(material, gloss)| {
             let mix: Vec<_> = material
                 .weights
                 .iter()
@@ -273,7 +274,7 @@ fn report(prepared: &DocumentDots, fidelity: &preview::FidelityReport, dots: &Ha
                 "share": material.share, "distance": material.distance,
                 "unscaled_distance": material.unscaled_distance, "light_distance": material.light, "mix": mix,
                 "gap": material.gap, "gap_is_a_bound": material.convex, "starts": material.starts,
-                "starts_agreeing": material.agreeing, "pruning_cost": material.pruning_cost,
+                "starts_agreeing": material.agreeing, "pruning_cost": material.pruning_cost, "gloss_units": gloss,
             })
         })
         .collect();

@@ -355,11 +355,12 @@ fn light_is_weighed_beside_the_curve() {
     for light in [0.0, 0.2, 0.5, 2.0] {
         let mut two = Table::new(space.columns());
         [at("C+M+Y+F"), at("P+SF")].iter().for_each(|&k| two.push(all.row(k)));
+        let hue = |mix: &[f64]| if light > 0.0 { missed_hue(&space, mix, &target) } else { 0.0 };
         let hull = Hull::new(&space, &two, &[0.0; 2], light).unwrap();
         let best = Mixer::new().best(&hull, &hull.target(&target).unwrap()).unwrap();
         let both = |s: f64| {
             let mix = mixture(&two, &[1.0 - s, s]);
-            space.distance(&mix, &target).hypot(light * space.light_distance(&mix, &target))
+            space.distance(&mix, &target).hypot(light * space.light_distance(&mix, &target)).hypot(hue(&mix))
         };
         let scan = (0..=2000).map(|i| both(f64::from(i) / 2000.0)).fold(f64::INFINITY, f64::min);
         assert!(
@@ -368,6 +369,62 @@ fn light_is_weighed_beside_the_curve() {
             best.fit
         );
         assert!((space.distance(&mixture(&two, &best.weights), &target) - best.fit.curve).abs() < 1e-9);
+    }
+}
+
+/// The part of the distance that is hue in the dark, written out: chromaticities of the mean reflectance beyond 45 degrees,
+/// weighted by solid angle and cosine as d is.
+fn missed_hue(space: &Space, mix: &[f64], target: &[f64]) -> f64 {
+    let mean = |row: &[f64], channel: usize| {
+        let (mut sum, mut all) = (0.0, 0.0);
+        for (n, t) in space.angles().iter().enumerate().filter(|(_, t)| t.to_degrees() > 45.0) {
+            let share = t.sqrt() * t.sin() * t.cos();
+            sum += share * row[3 * n + channel];
+            all += share;
+        }
+        sum / all + 0.0003
+    };
+    let chromaticity = |row: &[f64]| {
+        let of: [f64; 3] = std::array::from_fn(|channel| mean(row, channel));
+        let level = of.iter().sum::<f64>() / 3.0;
+        (of.map(|f| f / level), level)
+    };
+    let ((wanted, level), (printed, _)) = (chromaticity(target), chromaticity(mix));
+    let apart: f64 = wanted.iter().zip(printed).map(|(a, b)| (a - b).powi(2)).sum();
+    0.032 / (1.0 + level / 0.01) * apart.sqrt()
+}
+
+/// Of a reddish and a bluish black, both too light: neither alone is as near to dark metal as the mixture of its hue, and the
+/// slope of what is minimised is that of the formula.
+#[test]
+fn hue_in_the_dark_is_weighed_beside_the_rest() {
+    let space = Space::half_angle(32);
+    let mut two = Table::new(space.columns());
+    for tint in [[3.0, 1.0, 1.0], [1.0, 1.2, 2.0]] {
+        two.push(&tint.repeat(32).iter().map(|f| 0.001 * f).collect::<Vec<_>>());
+    }
+    for (f0, alpha) in [(0.05, 0.02), (0.1, 0.1), (0.14, 0.2)] {
+        let curve = |t: f64| [0.75, 0.9, 1.0].map(|c| c * f0 * inks::ggx::lobe(t, alpha));
+        let target = space.row(&Curve::sampled(space.angles(), curve));
+        let hull = Hull::new(&space, &two, &[0.0; 2], 0.28).unwrap();
+        let best = Mixer::new().best(&hull, &hull.target(&target).unwrap()).unwrap();
+        let all = |s: f64| {
+            let mix = mixture(&two, &[1.0 - s, s]);
+            let light = 0.28 * space.light_distance(&mix, &target);
+            space.distance(&mix, &target).hypot(light).hypot(missed_hue(&space, &mix, &target))
+        };
+        let scan = (0..=2000).map(|i| all(f64::from(i) / 2000.0)).fold(f64::INFINITY, f64::min);
+        assert!(best.fit.distance <= scan + 1e-9 && scan < best.fit.distance + 1e-6, "{f0}: {best:?} {scan}");
+        assert!(best.weights.iter().all(|&w| w > 0.02), "{f0}: {best:?}");
+        // The certificate counts what hue costs, so it is no smaller than that.
+        let without =
+            Mixer::new().best(&hull.clone().blind_to_hue(), &hull.target(&target).unwrap()).unwrap();
+        let without_hue = |s: f64| {
+            let mix = mixture(&two, &[1.0 - s, s]);
+            space.distance(&mix, &target).powi(2) + (0.28 * space.light_distance(&mix, &target)).powi(2)
+        };
+        let cost = without_hue(best.weights[1]) - without_hue(without.weights[1]);
+        assert!((-1e-12..=best.fit.gap + 1e-12).contains(&cost), "{cost} {:?}", best.fit);
     }
 }
 

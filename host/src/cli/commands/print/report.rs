@@ -12,6 +12,7 @@ use appearance::gamut::{DistanceUncertainty, MaterialReport};
 use halftone::metrics::{Look, Tone};
 use press::html::{self, escape};
 use press::job::plan::{Plan, grouped};
+use press::preview::gloss::{self, Gloss};
 use press::preview::{Contrasts, FidelityReport, Spectrum, mix_in_words};
 
 /// Materials whose curves are drawn: those that stand for most of the document.
@@ -34,6 +35,8 @@ pub struct Subject<'a> {
     pub space: &'a Space,
     /// Materials before and after mapping.
     pub materials: &'a [MaterialReport],
+    /// The gloss of each.
+    pub gloss: &'a [Gloss],
     /// What a material is: a basis of the document, or a typical one.
     pub kind: &'a str,
     /// Document and print as an eye sees them, and its distance in metres.
@@ -132,15 +135,19 @@ fn write_gamut(subject: &Subject, plots: &[(usize, String)], page: &mut String) 
     write!(
         page,
         "<h2>Gamut</h2>\n<p>Lines: the {kind}. Dashed: the best mixture of the stacks in use.{some}</p>\n{wide}<table>\
-         <tr><th class=\"n\">{kind}<th class=\"n\">share<th class=\"n\">d<th class=\"n\">light<th>mixture"
+         <tr><th class=\"n\">{kind}<th class=\"n\">share<th class=\"n\">d<th class=\"n\">light<th>gloss at 20, 60, 85&deg;<th>printed<th>mixture"
     )?;
-    for (number, material) in subject.materials.iter().enumerate() {
+    for (number, (material, gloss)) in subject.materials.iter().zip(subject.gloss).enumerate() {
         write!(
             page,
-            "<tr><td class=\"n\">{number}<td class=\"n\">{:.1} %<td class=\"n\">{:.3}<td class=\"n\">{:.3}<td class=\"words\">{}",
+            "<tr><td class=\"n\">{number}<td class=\"n\">{:.1} %<td class=\"n\">{:.3}<td class=\"n\">{:.3}<td>{}{}<td>{}\
+             <td class=\"words\">{}",
             100.0 * material.share,
             material.unscaled_distance,
             material.light,
+            gloss::in_words(gloss.target),
+            if gloss.matter_than_any_ink { ", matter than any ink: a matt spray would bring it" } else { "" },
+            gloss::in_words(gloss.printed),
             escape(&mix_in_words(&material.weights))
         )?;
     }
@@ -314,6 +321,12 @@ mod tests {
             pruning_cost: 0.0,
         };
         let mut materials: Vec<MaterialReport> = (0..DRAWN + 3).map(|i| material(i % 2)).collect();
+        let gloss = [false, true].map(|matter_than_any_ink| Gloss {
+            target: [1.0, 2.0, 3.0],
+            printed: [20.0, 45.0, 80.0],
+            matter_than_any_ink,
+        });
+        let gloss: Vec<Gloss> = (0..DRAWN + 3).map(|i| gloss[i % 2]).collect();
         materials[..3].iter_mut().for_each(|material| material.share = 0.01);
         let (rmse, p95, max, light_rmse) = (0.02, 0.03, 0.4, 0.05);
         let fidelity =
@@ -324,6 +337,7 @@ mod tests {
             plan: &plan,
             space: &space,
             materials: &materials,
+            gloss: &gloss,
             kind: "basis",
             fidelity: (&fidelity, 0.5),
             doubt: Some(DistanceUncertainty { distance: 0.03, deviation: 0.006, within: 0.124, known: 0.96 }),
@@ -351,6 +365,8 @@ mod tests {
             "preview-02-cyan.png",
             "plan.html",
             "finest an eye resolves",
+            "1.0, 2.0, 3.0 (matt), matter than any ink: a matt spray would bring it",
+            "20, 45, 80 (satin)",
         ] {
             assert!(text.contains(part), "{part}");
         }
