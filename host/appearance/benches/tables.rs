@@ -55,7 +55,7 @@ fn hue(data: Option<&Path>) {
     println!("|---|---|---|---|---|---|---|");
     for inks in [("default", InkSet::default()), ("all", InkSet::of(Ink::ALL))] {
         row("dark panes", inks, &Panes(Space::half_angle(32)));
-        let mut open = |path: &str| {
+        let open = |path: &str| {
             let document = document::open(path, &Options::default(), &Silent).unwrap();
             row(path.rsplit('/').next().unwrap_or(path), inks, document.materials());
         };

@@ -24,7 +24,7 @@ type Drawing = fn(usize, usize) -> f64;
 
 /// Bars that grow lighter to the right.
 fn bars(x: usize, y: usize) -> f64 {
-    if y / 4 % 2 == 0 { x as f64 / (SIDES.0 - 1) as f64 } else { 0.25 }
+    if (y / 4).is_multiple_of(2) { x as f64 / (SIDES.0 - 1) as f64 } else { 0.25 }
 }
 
 /// A disc on black.
@@ -94,8 +94,8 @@ fn each_picture_is_seen_in_its_view_and_the_other_one_is_not() {
         });
         let between = correlation(&drawn[0], &drawn[1]).abs();
         assert!(between < 0.2, "the drawings themselves resemble each other: {between}");
-        for view in 0..2 {
-            let [own, other] = [view, 1 - view].map(|k| correlation(&seen[view], &drawn[k]));
+        for (view, seen) in seen.iter().enumerate() {
+            let [own, other] = [view, 1 - view].map(|k| correlation(seen, &drawn[k]));
             assert!(own > 0.9 && other.abs() < between + 0.1, "{inks}, view {view}: {own}, {other}");
         }
         // The stated contrasts, by hand: white and black bars beside the disc, and the disc on a bar of one grey.
@@ -109,7 +109,8 @@ fn each_picture_is_seen_in_its_view_and_the_other_one_is_not() {
             let values: Vec<f64> = all.map(|i| seen[view][i].powi(3)).collect();
             values.iter().sum::<f64>() / values.len() as f64
         };
-        let grey = |x: usize, y: usize| y / 4 % 2 == 1 && y % 4 != 0 && y % 4 != 3 && (2..22).contains(&x);
+        let grey =
+            |x: usize, y: usize| y / 4 % 2 == 1 && !y.is_multiple_of(4) && y % 4 != 3 && (2..22).contains(&x);
         let far = |x: usize| (x as f64 - 14.0).abs() > 7.0;
         let bright = mean(1, &|x, y| grey(x, y) && (x as f64 - 14.0).hypot(y as f64 - 7.5) < 4.5);
         let dark = mean(1, &|x, y| grey(x, y) && far(x));

@@ -32,6 +32,9 @@ fn seen(
     errors_seen(&error_planes(sheet.index(), &asked, &tangent), &Eye::new(SIDE, SIDE, &[0.3]))[0]
 }
 
+/// Shares of the stacks at a place, which is 0 to 1 across and down.
+type Tones<'a> = &'a dyn Fn(f64, f64) -> Vec<f64>;
+
 /// The search does not see less than the cells that it starts from, with rare stacks far from all others beside those in use, with
 /// shadings and with texture.
 #[test]
@@ -44,8 +47,7 @@ fn the_search_is_never_grainier() {
         let n = noise(3, (u * 128.0) as usize, (v * 128.0) as usize, 1);
         vec![0.04, 0.6 * (1.0 - n), 0.6 * n, 0.2 * v, 0.01, 0.01, 0.01, 0.33 - 0.2 * v]
     };
-    let kinds: [(&str, &dyn Fn(f64, f64) -> Vec<f64>); 3] =
-        [("flat", &rare), ("shading", &shading), ("texture", &texture)];
+    let kinds: [(&str, Tones<'_>); 3] = [("flat", &rare), ("shading", &shading), ("texture", &texture)];
     for (kind, shares) in kinds {
         let minimum = [8, 16, 8, 16, 8, 8, 8, 8];
         let at = |method| seen(&names, &minimum, 128, shares, method);
