@@ -32,10 +32,13 @@ impl Installed {
     }
 }
 
-/// Where firmware is looked for: in the folder that [`VARIABLE`] names; else beside the program, where the build leaves it, and where
-/// packages put it.
+/// Where firmware is looked for: in the folder that [`VARIABLE`] names; else beside the program, in a folder there as in the archives that
+/// are downloaded, where the build leaves it, and where packages put it.
 pub fn folders() -> Vec<PathBuf> {
-    let program = env::current_exe().and_then(fs::canonicalize).unwrap_or_default();
+    let program = env::current_exe();
+    // On Unix a link to the program says nothing of where it was installed; Windows' canonical paths are not what people read.
+    let program = if cfg!(unix) { program.and_then(fs::canonicalize) } else { program };
+    let program = program.unwrap_or_default();
     folders_of(&program, env::var_os(VARIABLE))
 }
 
@@ -45,7 +48,8 @@ fn folders_of(program: &Path, named: Option<OsString>) -> Vec<PathBuf> {
     }
     let Some(beside) = program.parent() else { return Vec::new() };
     let above = beside.parent().unwrap_or(beside);
-    vec![beside.to_owned(), above.join("firmware"), above.join("share").join("foilpress").join("firmware")]
+    let packaged = above.join("share").join("foilpress").join("firmware");
+    vec![beside.to_owned(), beside.join("firmware"), above.join("firmware"), packaged]
 }
 
 /// The images that came with the program, for each board or for none.
@@ -79,6 +83,7 @@ mod tests {
     fn firmware_is_found_beside_the_program_where_builds_leave_it_and_where_packages_put_it() {
         for (place, program) in [
             ("downloads", "downloads/foilpress"),
+            ("foilpress-0.1.0/firmware", "foilpress-0.1.0/foilpress.exe"),
             ("target/firmware", "target/release/foilpress"),
             ("usr/share/foilpress/firmware", "usr/bin/foilpress"),
         ] {

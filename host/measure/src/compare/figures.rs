@@ -107,8 +107,9 @@ pub(crate) struct Steps<'a> {
     pub(crate) document: Option<&'a [Spots; 2]>,
     pub(crate) print: &'a Spots,
     pub(crate) photo: &'a [Option<[f64; 3]>],
-    /// Whether a pass lay beside its place.
-    pub(crate) placed: bool,
+    /// How many of the stacks the job has, if a pass lay beside its place. The others are slivers that this pass makes along edges, as wide as
+    /// the blur of a lens; they are solved for, and not judged.
+    pub(crate) placed: Option<usize>,
 }
 
 /// What covers the spots: for each spot the share of every curve.
@@ -226,7 +227,7 @@ fn fitted(
     let free = known.len() as f64 / OVERLAP;
     let used = factors.iter().filter(|factor| factor.share > 0.0).count() as f64;
     let freedom = free / (free - used).max(1.0);
-    let slight = if steps.placed { SLIGHT_PLACED } else { SLIGHT };
+    let slight = if steps.placed.is_some() { SLIGHT_PLACED } else { SLIGHT };
     for c in 0..3 {
         let (mut normal, mut right) = (vec![0.0; n * n], vec![0.0; n]);
         let mut whole = 0.0;
@@ -267,7 +268,8 @@ fn fitted(
             let variance = freedom * together(&moves, window.spots());
             let error = (variance + (factor.factor[c] * scale[c]).powi(2)).sqrt();
             factor.standard_error[c] = error;
-            factor.differs |= (factor.factor[c] - 1.0).abs() > (SURE * error).max(slight);
+            let is_judged = steps.placed.is_none_or(|own| s < own);
+            factor.differs |= is_judged && (factor.factor[c] - 1.0).abs() > (SURE * error).max(slight);
         }
     }
     factors.retain(|factor| factor.share >= TOLD);
@@ -358,7 +360,7 @@ mod tests {
 
         fn errors(&self, photo: &[Option<[f64; 3]>]) -> Option<(Errors, Vec<Factor>)> {
             let (lights, print) = (self.lights(), self.seen([1.0; 2]));
-            let steps = Steps { document: None, print: &print, photo, placed: false };
+            let steps = Steps { document: None, print: &print, photo, placed: None };
             errors(&steps, &lights, &self.window, [0.0; 3])
         }
     }

@@ -110,6 +110,11 @@ impl<'a> Passes<'a> {
         Passes { sheet, area, inks, stacks, curves, sets, numbers, bare }
     }
 
+    /// How many of the stacks the sheet has.
+    pub(super) fn own(&self) -> usize {
+        self.sets.len()
+    }
+
     /// The stack of a dot of the job.
     fn dot(&self, x: i64, y: i64) -> u8 {
         let (width, length) = (self.sheet.width() as i64, self.sheet.length() as i64);

@@ -189,7 +189,7 @@ impl<'a> Scenery<'a> {
             document: look.document.as_ref(),
             print: &look.predicted,
             photo: seen,
-            placed: registration.is_some(),
+            placed: registration.map(|_| self.passes.own()),
         };
         let Some((errors, stacks)) = figures::errors(&steps, &lights, window, look.scale.error) else {
             return Err(MeasureError::Scene(format!(
