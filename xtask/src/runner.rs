@@ -170,6 +170,7 @@ pub fn documentation(root: &Path) -> Result<()> {
     for member in members {
         let mut sources = Vec::new();
         all_files(&root.join(member).join("src"), &mut sources)?;
+        sources.retain(|path| path.extension().is_some_and(|end| end == "rs"));
         let texts = sources.iter().map(fs::read_to_string).collect::<io::Result<Vec<String>>>()?;
         if texts.iter().any(|text| has_example(text)) {
             let manifest = fs::read_to_string(root.join(member).join("Cargo.toml"))?;

@@ -29,6 +29,8 @@ const FIRST: &[(&str, &[&str])] = &[
     ("chart first", &["ink", "paper", "media", "output", "to", "yes", "copies", "json"]),
     ("chart heads", &["inks", "paper", "media", "output", "to", "yes", "copies", "json"]),
     ("layout", &["paper", "at", "repeat", "gap", "mirror", "crop-marks", "profile", "output"]),
+    ("factor", &["bases", "factor", "seed", "material", "colour-space", "samples", "output"]),
+    ("inks choose", &["cartridges", "inks", "library", "trust", "material", "json"]),
     ("map", &["inks", "intent", "metric", "library", "trust", "document", "seed", "output"]),
 ];
 

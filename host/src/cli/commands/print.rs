@@ -80,7 +80,7 @@ impl Work {
     foilpress print helmet.gltf --material 0 --factor sacls --intent clamp\n  \
     foilpress print sample:card --inks all          (with foils)\n  \
     foilpress print --straight day.png --highlight night.png --inks all\n  \
-    foilpress print --hdr window.exr"
+    foilpress print --hdr window.hdr"
 )]
 pub struct Args {
     #[command(flatten)]
