@@ -62,7 +62,9 @@ export async function visited(place, name, how, run) {
       const { violations } = await page.evaluate(() => window.axe.run());
       assert.deepEqual(violations.map(({ id, nodes }) => [id, nodes.map((node) => node.html)]), [], `${width} pixels`);
       // Nothing is wider than a phone, but tables that scroll for themselves.
-      assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), `wider than ${width} pixels`);
+      // A page may have to draw anew at first.
+      const fits = page.waitForFunction(() => document.documentElement.scrollWidth <= innerWidth, null, { timeout: 10_000 });
+      await fits.catch(() => assert.fail(`wider than ${width} pixels`));
       if (process.env.FOILPRESS_KEEP) {
         await page.screenshot({ path: `${process.env.FOILPRESS_KEEP}/${name.replaceAll('/', '-')}-${how.colorScheme}-${width}.png`, fullPage: true });
       }
