@@ -7,7 +7,7 @@
 use std::io::Write;
 use std::process::{Command, Stdio};
 
-use art::kinds::Order;
+use art::object_type::Order;
 use art::{Options, Page, Settings, compose};
 use inks::Library;
 use observe::Silent;

@@ -9,11 +9,11 @@
 //! Cost: about 2 ns a dot, and the halftones. Limits: [`MOST_PASSES`] planes, 256 stacks.
 
 mod arrange;
-mod beds;
 mod plates;
+mod separation;
 mod settings;
-mod slot;
 mod suggest;
+mod underbase;
 
 use inks::{InkSet, Library, Stack};
 use protocol::ink::{Ink, Kind};
@@ -36,13 +36,13 @@ use sheet::DotMap;
 use sheet::order::customary;
 use sheet::{MOST_PASSES, Plane, pack};
 
-use slot::{COLOURS, Slot};
+use separation::{COLOURS, Separation};
 
 pub use arrange::Order;
-pub use beds::MOST_CHOKE_MM;
+pub use separation::InkLayer;
 pub use settings::{Finish, GAMMAS, Settings, Text};
-pub use slot::Laid;
 pub use suggest::{Accept, Remedy, Suggestion};
+pub use underbase::MOST_CHOKE_MM;
 
 /// A report on composed art.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -50,7 +50,7 @@ pub struct Report {
     /// Width and height in millimetres.
     pub size_mm: (f64, f64),
     /// The inks from the paper up.
-    pub laid: Vec<Laid>,
+    pub laid: Vec<InkLayer>,
     /// Dots without any ink.
     pub bare: u64,
     /// What had to be assumed, including the notes of the art.
@@ -86,11 +86,11 @@ pub fn compose(
     if art.width as u64 * art.length as u64 == 0 {
         return Err(too_small(art.width as f64 * MM, art.length as f64 * MM));
     }
-    let (mut slots, picked) = drawn_slots(art, settings, library, observer, &mut tell)?;
-    beds::lay_white(&mut slots, art, settings, &mut tell)?;
-    beds::lay_finish(&mut slots, art, settings)?;
-    slots.retain(|slot| slot.plane.dots() > 0);
-    if slots.is_empty() {
+    let (mut separations, picked) = drawn_separations(art, settings, library, observer, &mut tell)?;
+    underbase::lay_white(&mut separations, art, settings, &mut tell)?;
+    underbase::lay_finish(&mut separations, art, settings)?;
+    separations.retain(|separation| separation.plane.dots() > 0);
+    if separations.is_empty() {
         let is_drawn = art.opaque.as_ref().is_some_and(|opaque| opaque.dots() > 0);
         let reason = match &art.layers[..] {
             [] if is_drawn => return Err(only_white(&art.name)),
@@ -99,27 +99,30 @@ pub fn compose(
         };
         return Err(nothing(reason));
     }
-    let mut inks: Vec<Ink> = slots.iter().map(|slot| slot.ink).collect();
+    let mut inks: Vec<Ink> = separations.iter().map(|separation| separation.ink).collect();
     inks.sort_unstable();
     inks.dedup();
-    let mut slots = arrange::arranged(slots, &settings.order, library)?;
-    for slot in &mut slots {
-        slot.passes =
-            usize::from(settings.passes.iter().find(|(ink, _)| *ink == slot.ink).map_or(1, |p| p.1));
+    let mut separations = arrange::arranged(separations, &settings.order, library)?;
+    for separation in &mut separations {
+        separation.passes =
+            usize::from(settings.passes.iter().find(|(ink, _)| *ink == separation.ink).map_or(1, |p| p.1));
     }
     if let Some((ink, _)) = settings.passes.iter().find(|(ink, _)| !inks.contains(ink)) {
         tell(format!("the art has no {}, so its number of passes has no effect", ink.name()));
     }
-    let passes: usize = slots.iter().map(|slot| slot.passes).sum();
+    let passes: usize = separations.iter().map(|separation| separation.passes).sum();
     if passes > MOST_PASSES {
-        let inks =
-            slots.iter().flat_map(|slot| vec![slot.ink.name(); slot.passes]).collect::<Vec<_>>().join(", ");
+        let inks = separations
+            .iter()
+            .flat_map(|separation| vec![separation.ink.name(); separation.passes])
+            .collect::<Vec<_>>()
+            .join(", ");
         return Err(too_many_passes(passes, &inks));
     }
     // White and finish beneath and on them make other stacks of what was picked.
     let is_bare = matches!(settings.white, None | Some(White::None))
         && matches!(settings.finish, None | Some(Finish::None));
-    stack_up(art, &slots, picked.filter(|_| is_bare), settings, notes)
+    stack_up(art, &separations, picked.filter(|_| is_bare), settings, notes)
 }
 
 /// The stack of each dot, and for each stack the inks that it has, a bit each.
@@ -130,14 +133,14 @@ struct Stacked {
 }
 
 /// The layers of the art itself, with tones and colours halftoned; and what was picked for its colours if it has nothing else.
-fn drawn_slots(
+fn drawn_separations(
     art: &Artwork,
     settings: &Settings,
     library: &Library,
     observer: &dyn Observer,
     tell: &mut dyn FnMut(String),
-) -> Result<(Vec<Slot>, Option<Stacked>), Diagnosis> {
-    let mut slots: Vec<Slot> = Vec::new();
+) -> Result<(Vec<Separation>, Option<Stacked>), Diagnosis> {
+    let mut separations: Vec<Separation> = Vec::new();
     let mut together = picked_together(art, settings, library)?;
     for (at, layer) in art.layers.iter().enumerate() {
         let name = layer.ink.name();
@@ -165,13 +168,13 @@ fn drawn_slots(
             },
         };
         let (ink, from, place) = (layer.ink, layer.name.clone(), layer.place);
-        slots.push(Slot { ink, from, place, plane, passes: 1 });
+        separations.push(Separation { ink, from, place, plane, passes: 1 });
     }
     if let Some(colour) = &art.colour {
         let process = InkSet::of(settings.inks.iter().filter(|ink| ink.kind() == Kind::Process));
         if process.is_empty() {
             tell("the picture's colours are left out, because no process ink is allowed".into());
-            return Ok((slots, None));
+            return Ok((separations, None));
         }
         let how = How {
             intent: settings.intent,
@@ -181,26 +184,29 @@ fn drawn_slots(
         };
         let Picked { planes, stacks } =
             colour.picked((art.width, art.length), &process, how, library, observer)?;
-        if slots.is_empty() {
+        if separations.is_empty() {
             let inks = planes.iter().map(|(ink, _)| *ink).collect();
-            let slot = |(ink, plane)| Slot { ink, from: COLOURS.into(), place: None, plane, passes: 1 };
+            let separation =
+                |(ink, plane)| Separation { ink, from: COLOURS.into(), place: None, plane, passes: 1 };
             let stacked = stacks.map(|(index, inks_of)| Stacked { index, inks_of, inks });
-            return Ok((planes.into_iter().map(slot).collect(), stacked));
+            return Ok((planes.into_iter().map(separation).collect(), stacked));
         }
         let mut spot = bitplane::blank(art.width, art.length);
-        slots.iter().for_each(|slot| bitplane::add(&mut spot, &slot.plane));
+        separations.iter().for_each(|separation| bitplane::add(&mut spot, &separation.plane));
         for (ink, mut plane) in planes {
             if !colour.overprints {
                 // Dots of a layer, such as a reserved colour, keep that ink alone.
                 bitplane::merge(&mut plane, &spot, |dots, spot| dots & !spot);
             }
-            match slots.iter_mut().find(|slot| slot.ink == ink) {
-                Some(slot) => bitplane::add(&mut slot.plane, &plane),
-                None => slots.push(Slot { ink, from: COLOURS.into(), place: None, plane, passes: 1 }),
+            match separations.iter_mut().find(|separation| separation.ink == ink) {
+                Some(separation) => bitplane::add(&mut separation.plane, &plane),
+                None => {
+                    separations.push(Separation { ink, from: COLOURS.into(), place: None, plane, passes: 1 })
+                }
             }
         }
     }
-    Ok((slots, None))
+    Ok((separations, None))
 }
 
 /// The numbers of the layers with tones of process inks whose dots are picked from one table, and their dots.
@@ -261,17 +267,18 @@ fn tone(
     Ok(bitplane::from_bytes(art.width, dots.index(), |stack| stack == 1))
 }
 
-/// The inks on a dot with the slots of `mask`, from the paper up.
-fn layers(slots: &[Slot], mask: usize, settings: &Settings) -> Vec<Ink> {
+/// The inks on a dot with the separations of `mask`, from the paper up.
+fn layers(separations: &[Separation], mask: usize, settings: &Settings) -> Vec<Ink> {
     let mut layers: Vec<Ink> = Vec::new();
-    for (_, slot) in slots.iter().enumerate().filter(|(at, _)| mask & 1 << at != 0) {
-        if settings.knockout.contains(slot.ink) {
+    for (_, separation) in separations.iter().enumerate().filter(|(at, _)| mask & 1 << at != 0) {
+        if settings.knockout.contains(separation.ink) {
             layers.retain(|ink| ink.kind() != Kind::Process);
         }
-        let three_times =
-            slot.ink == Ink::White && slot.passes == 1 && settings.accept.contains(&Accept::WhiteThrice);
-        let passes = if three_times { 3 } else { slot.passes };
-        layers.extend(std::iter::repeat_n(slot.ink, passes));
+        let three_times = separation.ink == Ink::White
+            && separation.passes == 1
+            && settings.accept.contains(&Accept::WhiteThrice);
+        let passes = if three_times { 3 } else { separation.passes };
+        layers.extend(std::iter::repeat_n(separation.ink, passes));
     }
     if settings.accept.contains(&Accept::FoilUndercoat)
         && let Some(foil) = layers.iter().position(|ink| ink.kind() == Kind::Foil)
@@ -293,33 +300,33 @@ fn layers(slots: &[Slot], mask: usize, settings: &Settings) -> Vec<Ink> {
     layers
 }
 
-/// Makes a stack of every combination of slots that occurs. What was `picked` is these slots, a dot at a time.
+/// Makes a stack of every combination of separations that occurs. What was `picked` is these separations, a dot at a time.
 fn stack_up(
     art: &Artwork,
-    slots: &[Slot],
+    separations: &[Separation],
     picked: Option<Stacked>,
     settings: &Settings,
     notes: Vec<String>,
 ) -> Result<Composed, Diagnosis> {
     let (width, length) = (art.width, art.length);
-    let planes: Vec<&Plane> = slots.iter().map(|slot| &slot.plane).collect();
+    let planes: Vec<&Plane> = separations.iter().map(|separation| &separation.plane).collect();
     let picked = picked.map(|Stacked { index, inks_of, inks }| {
         // An ink may be listed at two depths.
-        let has = |bits: u16, slot: &Slot| {
-            inks.iter().zip(0..).any(|(ink, at)| *ink == slot.ink && bits >> at & 1 > 0)
+        let has = |bits: u16, separation: &Separation| {
+            inks.iter().zip(0..).any(|(ink, at)| *ink == separation.ink && bits >> at & 1 > 0)
         };
         let mask = |bits: u16| {
-            slots
+            separations
                 .iter()
                 .enumerate()
-                .filter(|(_, slot)| has(bits, slot))
+                .filter(|(_, separation)| has(bits, separation))
                 .fold(0, |mask, (at, _)| mask | 1 << at)
         };
         (index, inks_of.map(mask))
     });
     let census = match &picked {
         Some((index, masks)) => {
-            let mut census = vec![0; 1 << slots.len()];
+            let mut census = vec![0; 1 << separations.len()];
             let counts: Vec<[u64; 256]> =
                 index.par_chunks(1 << 20).map(|dots| sheet::census([dots].into_iter())).collect();
             for (count, &mask) in counts.iter().flat_map(|counts| counts.iter().zip(masks)) {
@@ -333,7 +340,7 @@ fn stack_up(
     let mut counts = vec![0u64];
     let mut stack_of = vec![0u16; census.len()];
     for (mask, &count) in census.iter().enumerate().filter(|(_, count)| **count > 0) {
-        let stack = Stack::new(layers(slots, mask, settings));
+        let stack = Stack::new(layers(separations, mask, settings));
         let number = stacks.iter().position(|known| *known == stack).unwrap_or_else(|| {
             stacks.push(stack);
             counts.push(0);
@@ -356,22 +363,22 @@ fn stack_up(
         None => pack::unpack(&planes, width, length, &stack_of).unwrap_or_default(),
     };
     let dots = DotMap::new(width, length, stacks, index).map_err(no_sheet)?;
-    let laid: Vec<Laid> = slots
+    let laid: Vec<InkLayer> = separations
         .iter()
         .enumerate()
-        .map(|(at, slot)| Laid {
-            ink: slot.ink.name(),
+        .map(|(at, separation)| InkLayer {
+            ink: separation.ink.name(),
             dots: census
                 .iter()
                 .enumerate()
                 .filter(|(mask, _)| mask & 1 << at != 0)
                 .map(|(_, count)| count)
                 .sum(),
-            from: slot.from.clone(),
-            passes: slot.passes,
+            from: separation.from.clone(),
+            passes: separation.passes,
         })
         .collect();
-    let order: Vec<Ink> = slots.iter().map(|slot| slot.ink).collect();
+    let order: Vec<Ink> = separations.iter().map(|separation| separation.ink).collect();
     let mut suggestions = suggest::suggest(dots.stacks(), &counts, &order);
     suggestions.extend(suggest::rare(&laid));
     suggestions.extend(suggest::knocked_out(art.knocked_out));

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 
 use super::bitplane;
 use super::colour::Colour;
-use super::kinds::{BYTES, ObjectType, split};
+use super::object_type::{BYTES, ObjectType, split};
 use super::window::Window;
 use sheet::Plane;
 

@@ -2,7 +2,7 @@
 //!
 //! Method: red, green and blue in 24 bits, and a bit for what drew the colour, which decides how it is mixed.
 
-use super::kinds::ObjectType;
+use super::object_type::ObjectType;
 
 /// The colour of a dot: red, green and blue from the top of the lowest 24 bits, [`DRAWN`] and [`LABEL`].
 pub(super) type Key = u32;

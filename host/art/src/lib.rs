@@ -35,10 +35,10 @@ mod foreign;
 mod indexed_page;
 mod intent;
 mod key;
-pub mod kinds;
 mod lattice;
 mod layered;
 pub mod names;
+pub mod object_type;
 mod open;
 mod options;
 mod order;
@@ -66,8 +66,8 @@ mod window;
 pub use artwork::{Artwork, Layer, Shape};
 pub use colour::Colour;
 pub use compose::{
-    Accept, Composed, Finish, GAMMAS, Laid, MOST_CHOKE_MM, Order, Remedy, Report, Settings, Suggestion, Text,
-    compose,
+    Accept, Composed, Finish, GAMMAS, InkLayer, MOST_CHOKE_MM, Order, Remedy, Report, Settings, Suggestion,
+    Text, compose,
 };
 pub use intent::Intent;
 pub use open::{is_art, open};

@@ -13,10 +13,10 @@ use super::artwork::Artwork;
 use super::colour::Colour;
 use super::error::wrong;
 use super::indexed_page::Numbered;
-use super::kinds::{BYTES, ObjectType, Order};
+use super::object_type::{BYTES, ObjectType, Order};
 use super::options::Options;
 use super::window::Window;
-use super::{bitplane, kinds, picture, size};
+use super::{bitplane, object_type, picture, size};
 use observe::Diagnosis;
 use sheet::Plane;
 
@@ -45,7 +45,7 @@ impl Page {
         Page(Pixels::Plain(rgb, width))
     }
 
-    /// Reads a page with tags ([`kinds`]) in this order, of so many pixels across and down.
+    /// Reads a page with tags ([`object_type`]) in this order, of so many pixels across and down.
     ///
     /// # Errors
     /// Those of reading.
@@ -87,7 +87,7 @@ impl Page {
             Pixels::Black(plane) => bitplane::bounds(plane),
             Pixels::Numbered(page) => page.bounds(),
             Pixels::Plain(rgb, width) => Window::around(rgb, *width, 3, 255),
-            Pixels::Tagged(pixels, width) => kinds::bounds(pixels, *width),
+            Pixels::Tagged(pixels, width) => object_type::bounds(pixels, *width),
         }
     }
 

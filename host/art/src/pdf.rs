@@ -4,7 +4,7 @@
 //! and nothing of it may be lost in silence.
 //! Method: drafts of all pages tell which hold art. If several do, the user chooses one, or names an ink for
 //! each. A page with spot colours that name inks is separated at its final number of dots. Any other page is drawn with the
-//! kind of each pixel ([`kinds`](super::kinds)), on a transparent background.
+//! kind of each pixel ([`object_type`](super::object_type)), on a transparent background.
 //! Cost: seconds a page. Limits: a time limit for each page ([`process`](crate::process)).
 
 mod complaint;

@@ -20,7 +20,7 @@ use super::decode::decode;
 use super::error::{io, wrong};
 use super::options::Options;
 use super::size::{self, Unstated};
-use super::{bitplane, kinds, pixels, resample, reserved, scans};
+use super::{bitplane, object_type, pixels, resample, reserved, scans};
 use pictures::resolution::Dpi;
 use sheet::Plane;
 
@@ -192,8 +192,8 @@ pub(super) fn tagged_artwork(
     pixels: Vec<u8>,
     options: &Options,
 ) -> Artwork {
-    let opaque = Some(plane_of::<{ kinds::BYTES }>(&pixels, size, dots, |pixel| pixel[0] != 0));
-    let art = opaque_artwork::<{ kinds::BYTES }>(name, name, size, dots, pixels, options);
+    let opaque = Some(plane_of::<{ object_type::BYTES }>(&pixels, size, dots, |pixel| pixel[0] != 0));
+    let art = opaque_artwork::<{ object_type::BYTES }>(name, name, size, dots, pixels, options);
     Artwork { opaque, ..art }
 }
 
@@ -245,7 +245,14 @@ pub(super) fn opaque_artwork<const N: usize>(
         // Reserved colours may be nearly white. Coarser than dots, they have the edges of all flat art.
         let coarse = pixels::Pixels { bytes: pixels, each: N, width: sides(size).0, height: sides(size).1 };
         let size = (dots.0 as u32, dots.1 as u32);
-        return opaque_artwork::<{ kinds::BYTES }>(name, file, size, dots, coarse.at_dots(dots), options);
+        return opaque_artwork::<{ object_type::BYTES }>(
+            name,
+            file,
+            size,
+            dots,
+            coarse.at_dots(dots),
+            options,
+        );
     }
     let drawn = plane_of::<N>(&pixels, size, dots, |p| p[N - 3..] != [255; 3]);
     let (mut layers, mut notes) = (Vec::new(), Vec::new());

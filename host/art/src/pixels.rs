@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 
 use super::edges::Edges;
 use super::key::{DRAWN, Key, LABEL, colour, key, of_drawn};
-use super::kinds::{BYTES, INKS_OF_PICTURES, ObjectType, split};
+use super::object_type::{BYTES, INKS_OF_PICTURES, ObjectType, split};
 use super::resample;
 use appearance::srgb;
 use appearance::wide::wide;

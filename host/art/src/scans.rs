@@ -10,7 +10,7 @@
 
 use rayon::prelude::*;
 
-use super::kinds::{ObjectType, split};
+use super::object_type::{ObjectType, split};
 use appearance::wide::wide;
 
 /// What is nearly white and nearly black. A test moves each of these by a fifth.

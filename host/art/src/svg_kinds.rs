@@ -4,9 +4,9 @@
 //! Method: the drawing is rendered again without its text, and again without its pictures. A pixel that differs shows text,
 //! or a picture. Cost: a look at each pixel. Limits: text that looks like what is beneath it is no text, which nobody sees.
 
-use super::kinds::{BYTES, ObjectType};
+use super::object_type::{BYTES, ObjectType};
 
-/// A rendered drawing on white, with the kind of each pixel ([`kinds`](super::kinds)); what is transparent has no kind.
+/// A rendered drawing on white, with the kind of each pixel ([`object_type`](super::object_type)); what is transparent has no kind.
 /// `rgba` is the drawing in straight alpha, `no_text` and `no_pictures` are the same without these, if it has any.
 pub(super) fn tagged(rgba: &[u8], no_text: Option<&[u8]>, no_pictures: Option<&[u8]>) -> Vec<u8> {
     let mut pixels = vec![0; rgba.len()];

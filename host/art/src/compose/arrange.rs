@@ -5,7 +5,7 @@ use observe::Diagnosis;
 use protocol::ink::Ink;
 
 use super::super::order;
-use super::slot::Slot;
+use super::separation::Separation;
 
 /// The order of layers from the paper up.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
@@ -21,42 +21,52 @@ pub enum Order {
     Inks(Vec<Ink>),
 }
 
-/// The slots from the paper up.
-pub(super) fn arranged(slots: Vec<Slot>, wanted: &Order, library: &Library) -> Result<Vec<Slot>, Diagnosis> {
-    let numbered = slots.iter().all(|slot| slot.place.is_some());
-    let twice = (1..slots.len()).find(|&i| slots[..i].iter().any(|slot| slot.ink == slots[i].ink));
-    let mut slots = slots;
+/// The separations from the paper up.
+pub(super) fn arranged(
+    separations: Vec<Separation>,
+    wanted: &Order,
+    library: &Library,
+) -> Result<Vec<Separation>, Diagnosis> {
+    let numbered = separations.iter().all(|separation| separation.place.is_some());
+    let twice = (1..separations.len())
+        .find(|&i| separations[..i].iter().any(|separation| separation.ink == separations[i].ink));
+    let mut separations = separations;
     match wanted {
         Order::Given => {}
-        Order::Default if numbered => slots.sort_by_key(|slot| slot.place),
+        Order::Default if numbered => separations.sort_by_key(|separation| separation.place),
         Order::Default | Order::Rules => {
             if let Some(twice) = twice {
-                let same = slots.iter().filter(|slot| slot.ink == slots[twice].ink);
-                let same: Vec<&str> = same.map(|slot| slot.from.as_str()).collect();
-                let problem =
-                    format!("{} layers are {} ({})", same.len(), slots[twice].ink.name(), same.join(", "));
+                let same = separations.iter().filter(|separation| separation.ink == separations[twice].ink);
+                let same: Vec<&str> = same.map(|separation| separation.from.as_str()).collect();
+                let problem = format!(
+                    "{} layers are {} ({})",
+                    same.len(),
+                    separations[twice].ink.name(),
+                    same.join(", ")
+                );
                 let remedy = "merge them, number the names of all layers from the paper up (01-white, 02-black, 03-white), or \
                               keep the given order";
                 return Err(Diagnosis::of_setting("order", problem).hint(remedy).set("order", "given"));
             }
-            let inks: Vec<Ink> = slots.iter().map(|slot| slot.ink).collect();
+            let inks: Vec<Ink> = separations.iter().map(|separation| separation.ink).collect();
             let order = order::by_rules(&inks, library);
-            slots.sort_by_key(|slot| order.iter().position(|&ink| ink == slot.ink));
+            separations.sort_by_key(|separation| order.iter().position(|&ink| ink == separation.ink));
         }
-        Order::Inks(order) => return in_order(slots, order),
+        Order::Inks(order) => return in_order(separations, order),
     }
-    Ok(slots)
+    Ok(separations)
 }
 
-/// The slots as listed. If an ink is listed more often than it has layers, its last layer is repeated.
-fn in_order(slots: Vec<Slot>, order: &[Ink]) -> Result<Vec<Slot>, Diagnosis> {
+/// The separations as listed. If an ink is listed more often than it has layers, its last layer is repeated.
+fn in_order(separations: Vec<Separation>, order: &[Ink]) -> Result<Vec<Separation>, Diagnosis> {
     let wrong = |problem: String| Err(Diagnosis::of_setting("order", problem));
-    if let Some(slot) = slots.iter().find(|slot| !order.contains(&slot.ink)) {
-        return wrong(format!("{} ({}) is not in the list", slot.ink.name(), slot.from));
+    if let Some(separation) = separations.iter().find(|separation| !order.contains(&separation.ink)) {
+        return wrong(format!("{} ({}) is not in the list", separation.ink.name(), separation.from));
     }
-    let mut arranged: Vec<Slot> = Vec::new();
+    let mut arranged: Vec<Separation> = Vec::new();
     for (at, &ink) in order.iter().enumerate() {
-        let of_ink: Vec<&Slot> = slots.iter().filter(|slot| slot.ink == ink).collect();
+        let of_ink: Vec<&Separation> =
+            separations.iter().filter(|separation| separation.ink == ink).collect();
         let nth = order[..at].iter().filter(|&&before| before == ink).count();
         let times = order.iter().filter(|&&listed| listed == ink).count();
         let Some(last) = of_ink.last() else {
@@ -65,9 +75,9 @@ fn in_order(slots: Vec<Slot>, order: &[Ink]) -> Result<Vec<Slot>, Diagnosis> {
         if of_ink.len() > times {
             return wrong(format!("{} has {} layers but is listed {times} times", ink.name(), of_ink.len()));
         }
-        let slot = of_ink.get(nth).unwrap_or(last);
-        let (from, plane) = (slot.from.clone(), slot.plane.clone());
-        arranged.push(Slot { ink, from, place: None, plane, passes: 1 });
+        let separation = of_ink.get(nth).unwrap_or(last);
+        let (from, plane) = (separation.from.clone(), separation.plane.clone());
+        arranged.push(Separation { ink, from, place: None, plane, passes: 1 });
     }
     Ok(arranged)
 }

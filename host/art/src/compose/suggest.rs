@@ -7,7 +7,7 @@ use inks::Stack;
 use protocol::ink::{Ink, Kind};
 use protocol::rgl::Media;
 
-use super::slot::{COLOURS, Laid};
+use super::separation::{COLOURS, InkLayer};
 
 /// An ink is not worth a pass on fewer dots of a picture's colours than one in this many.
 const RARE: u64 = 1000;
@@ -118,8 +118,8 @@ pub(super) fn knocked_out(dots: u64) -> Option<Suggestion> {
 }
 
 /// Suggestions to leave out inks that plain colour needs on so few dots that nobody would miss them.
-pub(super) fn rare(laid: &[Laid]) -> Vec<Suggestion> {
-    let coloured: Vec<&Laid> = laid.iter().filter(|laid| laid.from == COLOURS).collect();
+pub(super) fn rare(laid: &[InkLayer]) -> Vec<Suggestion> {
+    let coloured: Vec<&InkLayer> = laid.iter().filter(|laid| laid.from == COLOURS).collect();
     let all: u64 = coloured.iter().map(|laid| laid.dots).sum();
     coloured
         .into_iter()
@@ -139,8 +139,8 @@ pub(super) fn rare(laid: &[Laid]) -> Vec<Suggestion> {
 mod tests {
     use super::*;
 
-    fn laid(ink: Ink, dots: u64, from: &str) -> Laid {
-        Laid { ink: ink.name(), dots, from: from.into(), passes: 1 }
+    fn laid(ink: Ink, dots: u64, from: &str) -> InkLayer {
+        InkLayer { ink: ink.name(), dots, from: from.into(), passes: 1 }
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use super::super::edges::{self, Edges};
 use super::super::key::key;
-use super::super::kinds::ObjectType;
+use super::super::object_type::ObjectType;
 use super::figures::{GREY, SIDE as ART, SIZES, figure_by, map, softened, text};
 use super::mixtures::Rules;
 use super::tests::{Art, INKS, stack};

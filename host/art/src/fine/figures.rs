@@ -9,7 +9,7 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
 use super::super::intent::Light;
-use super::super::kinds::ObjectType;
+use super::super::object_type::ObjectType;
 use super::mixtures::{Rules, shares};
 use super::tests::{Art, INKS, stack};
 use super::*;

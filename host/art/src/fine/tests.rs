@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use super::super::fit::Wishes;
 use super::super::intent::Intent;
 use super::super::key::key;
-use super::super::kinds::{INKS_OF_PICTURES, ObjectType};
+use super::super::object_type::{INKS_OF_PICTURES, ObjectType};
 use super::super::pixels::Pixels;
 use super::mixtures::Rules;
 use super::*;

@@ -147,27 +147,27 @@ mod tests {
     use proptest::prelude::*;
     use testing::needs::ghostscript;
 
-    use super::super::super::kinds::{self, ObjectType};
+    use super::super::super::object_type::{self, ObjectType};
     use super::super::{Interpreter, command, order};
     use super::*;
     use crate::process::{Process, limit};
     use files::scratch::Scratch;
 
     /// The pixels of a PostScript page of 240 x 10 points, at a pixel a point.
-    fn drawn(marks: &str) -> Vec<[u8; kinds::BYTES]> {
+    fn drawn(marks: &str) -> Vec<[u8; object_type::BYTES]> {
         let folder = Scratch::new().unwrap();
         write(folder.path()).unwrap();
         let (page, picture) = (folder.path().join("page.ps"), folder.path().join("page.pam"));
         fs::write(&page, format!("%!PS\n<</PageSize [240 10]>> setpagedevice\n{marks}\nshowpage\n")).unwrap();
-        let device = format!("-sDEVICE={}", kinds::DEVICE);
+        let device = format!("-sDEVICE={}", object_type::DEVICE);
         let output = format!("-sOutputFile={}", picture.display());
         let options = OPTIONS.into_iter().chain(["-r72", &device, &output]);
         let mut command = command(&page, Interpreter::Usual, folder.path(), options);
         let said = Process::start(&mut command, limit()).unwrap().end(|| false).unwrap();
         let picture = fs::read(picture).unwrap();
         let mut input = &picture[..];
-        assert_eq!(kinds::header(&mut input).unwrap(), Some((240, 10)), "{said}");
-        let mut pixels = vec![[0; kinds::BYTES]; 2400];
+        assert_eq!(object_type::header(&mut input).unwrap(), Some((240, 10)), "{said}");
+        let mut pixels = vec![[0; object_type::BYTES]; 2400];
         pixels.as_flattened_mut().copy_from_slice(input);
         order(input).unwrap().turn(pixels.as_flattened_mut());
         pixels

@@ -12,8 +12,8 @@ use std::process::{Command, Stdio};
 
 use super::super::coverage;
 use super::super::error::{io, no_program, wrong};
-use super::super::kinds;
 use super::super::names::stem;
+use super::super::object_type;
 use super::super::size::check_pixels;
 use super::eps::{self, Bounds};
 use super::ghostscript::{self, Interpreter};
@@ -113,11 +113,11 @@ pub(super) fn drafts(
     Ok((usual, Interpreter::Usual))
 }
 
-/// A page with the kind of each pixel ([`kinds`]).
+/// A page with the kind of each pixel ([`object_type`]).
 pub(super) struct Tagged {
     /// Pixels across and down.
     pub size: (u32, u32),
-    /// [`kinds::BYTES`] bytes a pixel.
+    /// [`object_type::BYTES`] bytes a pixel.
     pub pixels: Vec<u8>,
 }
 
@@ -136,14 +136,14 @@ pub(super) fn tagged(
     conversion::write(folder.path()).map_err(io(path, "keep the conversion of its colours"))?;
     let convert = conversion::OPTIONS.map(String::from).to_vec();
     let options = [one_page(page), crop(path, part)?, convert].concat();
-    ghostscript((path, interpreter), &options, kinds::DEVICE, dpi, &picture, || false)?;
+    ghostscript((path, interpreter), &options, object_type::DEVICE, dpi, &picture, || false)?;
     let damaged = || wrong(path, format!("page {page} cannot be drawn"));
     let mut file = BufReader::new(File::open(&picture).map_err(|_| damaged())?);
-    let (width, height) = kinds::header(&mut file).ok().flatten().ok_or_else(damaged)?;
+    let (width, height) = object_type::header(&mut file).ok().flatten().ok_or_else(damaged)?;
     let side = |pixels: usize| u32::try_from(pixels).map_err(|_| damaged());
     let size = (side(width)?, side(height)?);
     check_pixels(path, size.0, size.1)?;
-    let mut pixels = vec![0; kinds::BYTES * width * height];
+    let mut pixels = vec![0; object_type::BYTES * width * height];
     file.read_exact(&mut pixels).map_err(io(path, "read its page"))?;
     let order = ghostscript::order(&pixels).map_err(|error| failed(path, error))?;
     order.turn(&mut pixels);

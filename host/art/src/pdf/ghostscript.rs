@@ -15,7 +15,7 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use super::super::kinds::{self, Order};
+use super::super::object_type::{self, Order};
 use super::complaint;
 use crate::process::{self, Process, ProcessError};
 use files::scratch::Scratch;
@@ -124,12 +124,12 @@ pub fn order(pixels: &[u8]) -> Result<Order, ProcessError> {
     }
     let mut command = Command::new(program());
     command.args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-g1x1", "-sOutputFile=-"]);
-    command.arg(format!("-sDEVICE={}", kinds::DEVICE)).args(["-c", "showpage"]);
+    command.arg(format!("-sDEVICE={}", object_type::DEVICE)).args(["-c", "showpage"]);
     let mut process = Process::start(command.stdout(Stdio::piped()), process::limit())?;
     let mut page = Vec::new();
     process.output().map_or(Ok(0), |output| output.take(1 << 10).read_to_end(&mut page))?;
     process.end(|| false)?;
-    let order = page.last_chunk::<{ kinds::BYTES }>().and_then(|bare| Order::seen(bare));
+    let order = page.last_chunk::<{ object_type::BYTES }>().and_then(|bare| Order::seen(bare));
     order.ok_or_else(|| {
         ProcessError::Failed("this version of Ghostscript writes pixels in an unknown way".into())
     })

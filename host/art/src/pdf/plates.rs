@@ -29,7 +29,7 @@ use super::super::names::{self, Named};
 use super::super::options::Options;
 use super::super::size;
 use super::super::window::Window;
-use super::super::{kinds, picture};
+use super::super::{object_type, picture};
 use super::conversion;
 use super::draw::{PROCESS, Part, Tagged, drafts, plates_beside, separate, tagged};
 use super::ghostscript::Interpreter;
@@ -281,8 +281,8 @@ fn overprint(pixels: &mut [u8], layers: &[&Vec<u8>], process: &[(String, Vec<u8>
     let taken: [u8; 256] =
         std::array::from_fn(|ink| (255.0 * conversion::taken(ink as f64 / 255.0)).round() as u8);
     let taken = |ink: u8| taken[usize::from(ink)];
-    pixels.par_chunks_mut(kinds::BYTES * ROWS).enumerate().for_each(|(block, pixels)| {
-        for (at, pixel) in (block * ROWS..).zip(pixels.as_chunks_mut::<{ kinds::BYTES }>().0) {
+    pixels.par_chunks_mut(object_type::BYTES * ROWS).enumerate().for_each(|(block, pixels)| {
+        for (at, pixel) in (block * ROWS..).zip(pixels.as_chunks_mut::<{ object_type::BYTES }>().0) {
             if layers.iter().any(|coverage| coverage[at] > 0) {
                 let [c, m, y, k] = inks.map(|ink| ink.map_or(0, |coverage| coverage[at]));
                 let [_, rgb @ ..] = pixel;
@@ -326,7 +326,7 @@ impl Separated {
         let plates = self.plates.iter();
         plates
             .filter_map(|(.., coverage)| Window::around(coverage, self.size.0, 1, 0))
-            .chain(self.rest.iter().filter_map(|pixels| kinds::bounds(pixels, self.size.0)))
+            .chain(self.rest.iter().filter_map(|pixels| object_type::bounds(pixels, self.size.0)))
             .reduce(|all, window| all.join(&window))
     }
 
@@ -352,7 +352,7 @@ impl Separated {
         let mut art = match self.rest {
             None => Artwork::blank(name, dots),
             Some(pixels) => {
-                picture::opaque_artwork::<{ kinds::BYTES }>(name, name, size, dots, pixels, options)
+                picture::opaque_artwork::<{ object_type::BYTES }>(name, name, size, dots, pixels, options)
             }
         };
         if let Some(colour) = &mut art.colour {

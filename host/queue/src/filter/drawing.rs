@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{ChildStdout, Stdio};
 
 use art::Page;
-use art::kinds::{self, Order};
+use art::object_type::{self, Order};
 use art::pdf::{self, Interpreter, conversion};
 use art::process::{self, Process, ProcessError};
 use files::scratch::Scratch;
@@ -41,7 +41,7 @@ impl Drawing {
         let scratch = Scratch::new().map_err(io_error("make a temporary folder"))?;
         conversion::write(scratch.path()).map_err(io_error("keep the conversion of colours"))?;
         let options =
-            [format!("-sDEVICE={}", kinds::DEVICE), format!("-r{dpi}"), "-sOutputFile=%stdout".into()];
+            [format!("-sDEVICE={}", object_type::DEVICE), format!("-r{dpi}"), "-sOutputFile=%stdout".into()];
         let page = page.map(|n| [format!("-dFirstPage={n}"), format!("-dLastPage={n}")]);
         let options = options
             .into_iter()
@@ -63,7 +63,7 @@ impl Drawing {
     /// Width and height of the next page in pixels, whatever they are.
     pub(super) fn next_page(&mut self) -> Result<Option<(usize, usize)>, FilterError> {
         self.process.advance();
-        kinds::header(&mut self.pages).map_err(|source| self.cut_short(source))
+        object_type::header(&mut self.pages).map_err(|source| self.cut_short(source))
     }
 
     /// The page.

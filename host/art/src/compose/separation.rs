@@ -1,4 +1,4 @@
-//! Planes of ink on their way into stacks.
+//! Separations: planes of ink on their way into stacks.
 
 use protocol::ink::Ink;
 use serde::Serialize;
@@ -9,7 +9,7 @@ use sheet::Plane;
 pub(super) const COLOURS: &str = "the picture's colours";
 
 /// One ink at one depth, before it is part of stacks.
-pub(super) struct Slot {
+pub(super) struct Separation {
     pub ink: Ink,
     /// Its source: a layer's name, or the setting that asks for it.
     pub from: String,
@@ -21,7 +21,7 @@ pub(super) struct Slot {
 
 /// One ink at one depth of the composed art.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Laid {
+pub struct InkLayer {
     /// Name of the ink.
     pub ink: &'static str,
     /// Dots that have it.

@@ -7,8 +7,8 @@ use super::super::artwork::Artwork;
 use super::super::size::MM;
 use super::super::white::{self, White};
 use super::super::{bitplane, distance};
+use super::separation::Separation;
 use super::settings::{Finish, Settings};
-use super::slot::Slot;
 use sheet::Plane;
 
 /// The most that white is choked or spread, in mm.
@@ -16,29 +16,29 @@ pub const MOST_CHOKE_MM: f64 = 10.0;
 
 /// Adds white, and chokes or spreads it.
 pub(super) fn lay_white(
-    slots: &mut Vec<Slot>,
+    separations: &mut Vec<Separation>,
     art: &Artwork,
     settings: &Settings,
     tell: &mut dyn FnMut(String),
 ) -> Result<(), Diagnosis> {
-    if let Some((mode, mut bed)) = white_bed(slots, art, settings)? {
+    if let Some((mode, mut bed)) = white_bed(separations, art, settings)? {
         if !settings.inks.contains(Ink::White) {
             return refused("white", "white is not among the allowed inks");
         }
         // The art's own white becomes part of the bed, so that there is one layer of white.
-        if let Some(at) = slots.iter().position(|slot| slot.ink == Ink::White) {
-            let drawn = slots.remove(at);
+        if let Some(at) = separations.iter().position(|separation| separation.ink == Ink::White) {
+            let drawn = separations.remove(at);
             bitplane::add(&mut bed, &drawn.plane);
         }
         let from = format!("white setting: {mode}");
-        slots.push(Slot { ink: Ink::White, from, place: Some(0), plane: bed, passes: 1 });
+        separations.push(Separation { ink: Ink::White, from, place: Some(0), plane: bed, passes: 1 });
     }
-    choke(slots, settings.choke, tell)
+    choke(separations, settings.choke, tell)
 }
 
 /// The plane of white that the settings ask for, if any, and its mode.
 fn white_bed(
-    slots: &[Slot],
+    separations: &[Separation],
     art: &Artwork,
     settings: &Settings,
 ) -> Result<Option<(White, Plane)>, Diagnosis> {
@@ -46,7 +46,7 @@ fn white_bed(
     let bed = match mode {
         White::None => return Ok(None),
         White::Reserved => {
-            if !slots.iter().any(|slot| slot.ink == Ink::White) {
+            if !separations.iter().any(|separation| separation.ink == Ink::White) {
                 return refused(
                     "white",
                     "the picture has no reserved white; draw what is to be white in exactly 230,230,230",
@@ -57,10 +57,10 @@ fn white_bed(
         White::Under => {
             let mut under = bitplane::blank(art.width, art.length);
             let clear = |ink: Ink| matches!(ink.kind(), Kind::Finish | Kind::Primer);
-            slots
+            separations
                 .iter()
-                .filter(|slot| !clear(slot.ink))
-                .for_each(|slot| bitplane::add(&mut under, &slot.plane));
+                .filter(|separation| !clear(separation.ink))
+                .for_each(|separation| bitplane::add(&mut under, &separation.plane));
             under
         }
         White::Opaque => art.drawn.clone(),
@@ -81,7 +81,7 @@ fn white_bed(
 }
 
 /// Shrinks all white by so many dots, or spreads it if the number is negative.
-fn choke(slots: &mut [Slot], choke: f64, tell: &mut dyn FnMut(String)) -> Result<(), Diagnosis> {
+fn choke(separations: &mut [Separation], choke: f64, tell: &mut dyn FnMut(String)) -> Result<(), Diagnosis> {
     if choke == 0.0 {
         return Ok(());
     }
@@ -100,12 +100,12 @@ fn choke(slots: &mut [Slot], choke: f64, tell: &mut dyn FnMut(String)) -> Result
         ));
     }
     let mut any = false;
-    for slot in slots.iter_mut().filter(|slot| slot.ink == Ink::White) {
+    for separation in separations.iter_mut().filter(|separation| separation.ink == Ink::White) {
         any = true;
-        slot.plane = if choke > 0.0 {
-            distance::shrink(&slot.plane, square)
+        separation.plane = if choke > 0.0 {
+            distance::shrink(&separation.plane, square)
         } else {
-            distance::grow(&slot.plane, square)
+            distance::grow(&separation.plane, square)
         };
     }
     if !any {
@@ -119,12 +119,16 @@ fn refused<T>(setting: &'static str, problem: impl std::fmt::Display) -> Result<
 }
 
 /// Adds finish.
-pub(super) fn lay_finish(slots: &mut Vec<Slot>, art: &Artwork, settings: &Settings) -> Result<(), Diagnosis> {
+pub(super) fn lay_finish(
+    separations: &mut Vec<Separation>,
+    art: &Artwork,
+    settings: &Settings,
+) -> Result<(), Diagnosis> {
     let coat = match settings.finish {
         None | Some(Finish::None) => return Ok(()),
         Some(Finish::Artwork) => {
             let mut coat = art.drawn.clone();
-            slots.iter().for_each(|slot| bitplane::add(&mut coat, &slot.plane));
+            separations.iter().for_each(|separation| bitplane::add(&mut coat, &separation.plane));
             coat
         }
         Some(Finish::All) => bitplane::full(art.width, art.length),
@@ -132,9 +136,9 @@ pub(super) fn lay_finish(slots: &mut Vec<Slot>, art: &Artwork, settings: &Settin
     if !settings.inks.contains(Ink::Finish) {
         return refused("finish", "finish is not among the allowed inks");
     }
-    match slots.iter_mut().find(|slot| slot.ink == Ink::Finish) {
-        Some(slot) => bitplane::add(&mut slot.plane, &coat),
-        None => slots.push(Slot {
+    match separations.iter_mut().find(|separation| separation.ink == Ink::Finish) {
+        Some(separation) => bitplane::add(&mut separation.plane, &coat),
+        None => separations.push(Separation {
             ink: Ink::Finish,
             from: "finish setting".into(),
             place: Some(u32::MAX),
