@@ -106,8 +106,9 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         return draw_figure(args, figure, format, probe, staged, observer);
     }
     let (what, is_page) = (args.view.what(), format == Format::Page);
+    let with_bases = what != Show::Printed || is_page;
     args.wear.check(what == Show::Printed || is_page, is_page)?;
-    let mut shown = PreviewSubject::open(&args.dots, observer)?;
+    let mut shown = PreviewSubject::open(&args.dots, with_bases, observer)?;
     shown.worn = args.wear.apply(&mut shown.dots, &shown.library)?;
     if shown.target.is_none() && what != Show::Printed {
         bail!(

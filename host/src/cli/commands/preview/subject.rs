@@ -62,8 +62,9 @@ pub struct Page {
 }
 
 impl PreviewSubject {
-    /// What the argument names: a document, or printed dots.
-    pub fn open(work: &DotsArgs, observer: &dyn Observer) -> Result<PreviewSubject> {
+    /// What the argument names: a document, or printed dots. A document has its bases beside it only if that is what will be looked at:
+    /// finding them takes longer than all else.
+    pub fn open(work: &DotsArgs, with_bases: bool, observer: &dyn Observer) -> Result<PreviewSubject> {
         let path = work.document.path();
         if let Some(dots) = printed(path, observer)? {
             let name = printed_name(path);
@@ -81,8 +82,8 @@ impl PreviewSubject {
         if prepared.layout.repeat != Repeat::Grid(1, 1) {
             observer.note("one copy of the document is shown; `foilpress print` it and preview its job to see the whole sheet");
         }
-        let bases = prepared.bases(observer)?;
-        Ok(PreviewSubject::of(&prepared, &prepared.halftoned.mapped.mix, Some(bases), work))
+        let bases = with_bases.then(|| prepared.bases(observer)).transpose()?;
+        Ok(PreviewSubject::of(&prepared, &prepared.halftoned.mapped.mix, bases, work))
     }
 
     /// A document's dots, with the document and its mixture beside them where it has bases. `work` is what was asked for.
