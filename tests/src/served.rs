@@ -106,6 +106,11 @@ impl Port {
         Port { band, ..self }
     }
 
+    /// Bytes of the flash that are written.
+    pub fn written(&self) -> usize {
+        self.flash.lock().expect("no test panicked with it").iter().filter(|&&byte| byte != 0xff).count()
+    }
+
     fn status(&self) -> [u8; STATUS_LENGTH] {
         let carousel = Carousel::new(&self.cartridges).expect("at most seven cartridges");
         let mut printer = Printer::new(carousel, Lever::Auto);
