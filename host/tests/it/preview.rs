@@ -377,6 +377,14 @@ fn figures_of_the_paper_are_pictures_of_any_document() {
             .sum()
     };
     assert!(light(2) > light(4) && light(4) > light(5), "{} {} {}", light(2), light(4), light(5));
+    // A document's print, and a job; every row of the board has squares of black and white.
+    bench.done(&format!("preview tile {SMALL} --figure near -o near.png"));
+    bench.done(&format!("print tile {SMALL} -q -o out"));
+    bench.done("preview out/job.rgl --figure near -o job.png");
+    assert_eq!((size("near.png").0, size("job.png").0), (2 * 16 + 768, 2 * 16 + 768));
+    let picture = image::open(bench.path("near.png")).expect("a picture").into_rgb8();
+    let light = |x: u32| picture.get_pixel(x, 100).0[1];
+    assert!((0..11).all(|i| (light(48 + 64 * i) > 150) != (light(112 + 64 * i) > 150)));
     let refused = bench.run(&format!("preview tile {SMALL} --figure lights -o lights.html"));
     assert!(!refused.status.success());
 }

@@ -3,7 +3,8 @@
 use std::borrow::Cow;
 
 use anyhow::Result;
-use appearance::brdf::{Table, reflectances};
+use appearance::brdf::{Space, Table, reflectances};
+use appearance::document::SAMPLES;
 use appearance::factor::Factored;
 use appearance::gamut::{self, GamutSettings, Gloss, Intent, Mapped, Printable};
 use clap::ValueEnum;
@@ -11,9 +12,10 @@ use image::RgbImage;
 use inks::Library;
 use observe::Observer;
 use press::preview::figures::{SIX_LIGHTS, balls_picture, bases_alone, weights_picture};
-use press::preview::{Panels, Probe, Source};
+use press::preview::{Panels, Probe, Source, near_picture};
 use sheet::Area;
 
+use super::subject::{printed, printed_name};
 use crate::cli::arguments::document_dots::DotsArgs;
 
 /// Which one.
@@ -25,10 +27,15 @@ pub enum Figure {
     Balls,
     /// Document over print under six lights, from above down to 15 degrees (figure 11)
     Lights,
+    /// The print and a checkerboard behind it, which it mirrors (figure 2)
+    Near,
 }
 
 /// Draws a figure of a document.
 pub fn figure(figure: Figure, work: &DotsArgs, probe: &Probe, observer: &dyn Observer) -> Result<RgbImage> {
+    if figure == Figure::Near {
+        return near(work, observer);
+    }
     let prepared = work.document_dots(observer)?;
     let name = &prepared.document.name;
     if figure == Figure::Lights {
@@ -60,14 +67,30 @@ pub fn figure(figure: Figure, work: &DotsArgs, probe: &Probe, observer: &dyn Obs
     let columns = [
         ("document", alone.bases.clone()),
         ("stacks in use", stacks(&mapped, &prepared.library, &alone)),
-        ("clamped", printed(&clamped, &prepared.library, &alone)),
-        ("mapped", printed(&mapped, &prepared.library, &alone)),
+        ("clamped", mixed(&clamped, &prepared.library, &alone)),
+        ("mapped", mixed(&mapped, &prepared.library, &alone)),
     ];
     Ok(balls_picture(name, &bases.space, &columns, probe, observer)?)
 }
 
+/// What a print mirrors: of a document, a job or a sheet.
+fn near(work: &DotsArgs, observer: &dyn Observer) -> Result<RgbImage> {
+    let path = work.document.path();
+    let (name, dots, library) = match printed(path, observer)? {
+        Some(dots) => (printed_name(path), dots, work.inks.library()?),
+        None => {
+            let prepared = work.document_dots(observer)?;
+            (prepared.document.name.clone(), prepared.halftoned.dots.clone(), prepared.library)
+        }
+    };
+    let space = Space::half_angle(SAMPLES);
+    let stacks = reflectances(dots.stacks(), &library, &space);
+    let print = Source::Print { dots: &dots, space: &space, stacks: &stacks, area: Area::whole(&dots) };
+    Ok(near_picture(&name, &print, observer)?)
+}
+
 /// What the mixture of each pixel reflects.
-fn printed(mapped: &Mapped, library: &Library, document: &Factored) -> Table {
+fn mixed(mapped: &Mapped, library: &Library, document: &Factored) -> Table {
     let curves = reflectances(&mapped.mix.stacks, library, &document.space);
     let mut rows = Table::new(document.space.columns());
     let mut shares = vec![0.0; curves.len()];
