@@ -7,7 +7,7 @@
 //! [`SPOKES`] each, narrow where lobes are. The eye is the same everywhere, so the half vectors and the ways to the board are, too. How
 //! much light a ring brings depends on the place, and the curve of a pixel on its dots: the reflection is the sum of their products.
 //! The board is averaged over the footprint of a half vector and of the pixel, in closed form, so edges have no steps.
-//! Cost: for each pixel a board of some 4000 rays; seconds a picture. Error: below 2 % of the integral over the board itself (test).
+//! Cost: some 2700 rays a pixel; seconds a picture. Error: below 2 % of the integral over the board itself (test).
 //! Limits: those of the preview; footprints are rectangles along the board.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -24,11 +24,11 @@ use super::source::{Scratch, Source};
 use super::tone::ToneCurve;
 
 /// Rings of half vectors around the normal, and half vectors in each.
-const RINGS: usize = 112;
-const SPOKES: usize = 72;
+const RINGS: usize = 96;
+const SPOKES: usize = 56;
 
 /// Pixels across the sheet in the picture, and around everything.
-const SIDE: usize = 640;
+const SIDE: usize = 512;
 const GAP: usize = 16;
 
 /// How high the eye is over the sheet: 45 degrees.
@@ -90,10 +90,11 @@ impl Part {
         if high <= low {
             return Part { inside: 0.0, signed: 0.0 };
         }
-        // The integral of the stripes from 0.
+        // The integral of the stripes from 0; boards have fewer than 8192. Rounding down by a cast is five times as fast as a remainder.
         let integral = |at: f64| {
-            let at = at.rem_euclid(2.0 * stripe);
-            at.min(2.0 * stripe - at)
+            let pairs = at / (2.0 * stripe) + 4096.0;
+            let part = pairs - f64::from(pairs as u32);
+            2.0 * stripe * part.min(1.0 - part)
         };
         Part { inside: (high - low) / width, signed: (integral(high) - integral(low)) / width }
     }
