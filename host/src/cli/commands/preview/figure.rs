@@ -106,8 +106,8 @@ fn inked(dots: &DotMap) -> Area {
     let first = |row: &[u8]| row.iter().position(has_ink);
     let last = |row: &[u8]| row.iter().rposition(has_ink);
     let (Some(top), Some(bottom), Some(left), Some(right)) = (
-        rows().position(|row| row.iter().any(|stack| has_ink(stack))),
-        rows().rposition(|row| row.iter().any(|stack| has_ink(stack))),
+        rows().position(|row| row.iter().any(has_ink)),
+        rows().rposition(|row| row.iter().any(has_ink)),
         rows().filter_map(first).min(),
         rows().filter_map(last).max(),
     ) else {
