@@ -131,27 +131,14 @@ pub fn reading(geometry: Geometry, lobes: &Lobes) -> f64 {
     relative(geometry, diffuse + lobes.lobes.iter().map(|lobe| of_lobe(geometry, lobe)).sum::<f64>())
 }
 
-/// What a gloss meter reads on a surface of which only the curve over the half angle is known, light and eye in one place.
+/// What a gloss meter reads at some angles on a surface of which only the curve over the half angle is known, light and eye in one place.
 ///
 /// The curve is split into a body, which is what is left at its lowest, and a lobe above it, whose microfacets cover the unit disc
 /// once; so the lobe's F0 follows from its integral. Its shape stays that of the curve. Values beyond 75 degrees are not
 /// looked at, where measurements end or are noise.
-pub fn of_curve(geometry: Geometry, curve: &Curve) -> f64 {
+pub fn of_curve<const N: usize>(geometries: [Geometry; N], curve: &Curve) -> [f64; N] {
     let split = Split::of(curve, ASIDE);
-    let (sin_i, cos_i) = geometry.degrees.to_radians().sin_cos();
-    let per_f0 = 1.0 / split.f0.max(f64::MIN_POSITIVE);
-    let share = through_window(geometry, |o| {
-        let h = [o[0] - sin_i, o[1], o[2] + cos_i];
-        let length = (h[0] * h[0] + h[1] * h[1] + h[2] * h[2]).sqrt();
-        let (cos_h, cos_d) = ((h[2] / length).min(1.0), (cos_i * h[2] - sin_i * h[0]) / length);
-        // f = F0 D G / (4 cos^2 h) of the curve gives D, and the directions give F and G.
-        let distribution = 4.0 * cos_h * cos_h * split.lobe(curve, cos_h.acos())
-            / ggx::shadowing(cos_h, split.alpha).max(f64::MIN_POSITIVE);
-        let shadowing = 1.0 / (1.0 + lambda(cos_i, split.alpha) + lambda(o[2], split.alpha));
-        let lobe = reflectance(split.f0, cos_d) * per_f0 * distribution * shadowing / (4.0 * cos_i);
-        split.body * o[2] + lobe
-    });
-    relative(geometry, share)
+    geometries.map(|geometry| split.reading(geometry, curve))
 }
 
 /// A curve as a body and a lobe.
@@ -196,6 +183,24 @@ impl Split {
 
     fn lobe(&self, curve: &Curve, t: f64) -> f64 {
         (luminance(curve.at(t)) - self.body).max(0.0)
+    }
+
+    /// Gloss units at an angle of the curve that was split.
+    fn reading(&self, geometry: Geometry, curve: &Curve) -> f64 {
+        let (sin_i, cos_i) = geometry.degrees.to_radians().sin_cos();
+        let per_f0 = 1.0 / self.f0.max(f64::MIN_POSITIVE);
+        let share = through_window(geometry, |o| {
+            let h = [o[0] - sin_i, o[1], o[2] + cos_i];
+            let length = (h[0] * h[0] + h[1] * h[1] + h[2] * h[2]).sqrt();
+            let (cos_h, cos_d) = ((h[2] / length).min(1.0), (cos_i * h[2] - sin_i * h[0]) / length);
+            // f = F0 D G / (4 cos^2 h) of the curve gives D, and the directions give F and G.
+            let distribution = 4.0 * cos_h * cos_h * self.lobe(curve, cos_h.acos())
+                / ggx::shadowing(cos_h, self.alpha).max(f64::MIN_POSITIVE);
+            let shadowing = 1.0 / (1.0 + lambda(cos_i, self.alpha) + lambda(o[2], self.alpha));
+            let lobe = reflectance(self.f0, cos_d) * per_f0 * distribution * shadowing / (4.0 * cos_i);
+            self.body * o[2] + lobe
+        });
+        relative(geometry, share)
     }
 }
 
@@ -349,8 +354,9 @@ mod tests {
                         assert!((one.f0 / other.f0 - 1.0).abs() < 0.05, "{alpha}");
                         assert!((one.alpha / other.alpha - 1.0).abs() < 0.05);
                     }
-                    for geometry in [Geometry::TWENTY, Geometry::SIXTY, Geometry::EIGHTY_FIVE] {
-                        let (expected, found) = (reading(geometry, &lobes), of_curve(geometry, &curve));
+                    let geometries = [Geometry::TWENTY, Geometry::SIXTY, Geometry::EIGHTY_FIVE];
+                    for (geometry, found) in geometries.into_iter().zip(of_curve(geometries, &curve)) {
+                        let expected = reading(geometry, &lobes);
                         assert!(
                             (found - expected).abs() < 0.05 * expected + 0.3,
                             "F0 {f0}, body {kd}, alpha {alpha}, {} samples, {geometry:?}: {found}, not {expected}",
@@ -369,11 +375,11 @@ mod tests {
         let f0 = ((GLASS - 1.0) / (GLASS + 1.0)).powi(2);
         let curve = Curve::sampled(&angles, |t| [f0 * ggx::lobe(t, 0.001); 3]);
         for geometry in [Geometry::TWENTY, Geometry::SIXTY, Geometry::EIGHTY_FIVE] {
-            let found = of_curve(geometry, &curve);
+            let [found] = of_curve([geometry], &curve);
             assert!((found - 100.0).abs() < 4.0, "{geometry:?}: {found}");
             let white = Curve::sampled(&angles, |_| [1.0 / PI; 3]);
             let body = Lobes { kd: [1.0; 3], entering: 1.0, lobes: Vec::new() };
-            let (found, expected) = (of_curve(geometry, &white), reading(geometry, &body));
+            let ([found], expected) = (of_curve([geometry], &white), reading(geometry, &body));
             assert!((found / expected - 1.0).abs() < 1e-6, "{geometry:?}: {found} {expected}");
         }
     }

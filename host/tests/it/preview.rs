@@ -377,6 +377,23 @@ fn figures_of_the_paper_are_pictures_of_any_document() {
             .sum()
     };
     assert!(light(2) > light(4) && light(4) > light(5), "{} {} {}", light(2), light(4), light(5));
+    // The board is a fifth wider than the sheet of 512 pixels; a row of it has twelve squares.
+    bench.done(&format!("preview tile {SMALL} --figure near -o near.png"));
+    let picture = image::open(bench.path("near.png")).expect("a picture").into_rgb8();
+    assert_eq!(picture.width(), 2 * 16 + 614);
+    let is_white = |i: u32| picture.get_pixel(16 + 25 + 51 * i, 100).0[1] > 150;
+    assert!((0..11).all(|i| is_white(i) != is_white(i + 1)));
+    // The ramp of the paper: foil mirrors the squares, metallic ink hardly.
+    bench.done("chart ramp silver-foil metallic-silver -q -o ramp --figure ramp.png");
+    let picture = image::open(bench.path("ramp.png")).expect("a picture").into_rgb8();
+    let y = picture.height() - 16 - 36;
+    let spread = |from: u32| {
+        let light = |x: u32| (y..y + 8).map(|y| f64::from(picture.get_pixel(x, y).0[1])).sum::<f64>();
+        let all: Vec<f64> = (from..from + 100).map(light).collect();
+        let (low, high) = all.iter().fold((f64::MAX, 0.0f64), |(low, high), &v| (low.min(v), high.max(v)));
+        high / low
+    };
+    assert!(spread(80) > 1.3 * spread(450), "{} {}", spread(80), spread(450));
     let refused = bench.run(&format!("preview tile {SMALL} --figure lights -o lights.html"));
     assert!(!refused.status.success());
 }

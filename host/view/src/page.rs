@@ -31,7 +31,6 @@ use serde_json::json;
 use sheet::{Area, DotMap, colours, label};
 
 use crate::error::ViewError;
-use crate::gain::body;
 use crate::lit::fit;
 
 /// The longer side of a weight map.
@@ -278,7 +277,7 @@ fn edits(target: &Target) -> serde_json::Value {
         let found = Nearest::to(space, row);
         let Metallic { base, metallic } = found.metallic();
         json!({
-            "number": i, "body": body(&found, row), "f0": found.f0, "alpha": found.alpha, "base": base, "metallic": metallic,
+            "number": i, "body": found.diffuse.map(|d| d / std::f64::consts::PI), "f0": found.f0, "alpha": found.alpha, "base": base, "metallic": metallic,
         })
     };
     let used: Vec<usize> = (0..bases.len()).filter(|&i| totals[i] > 0).collect();

@@ -63,9 +63,11 @@ export function edited(table, surface, edit, last) {
       : (fall * visible(Math.cos(Math.min(theta, last)), alpha)) / visible(Math.cos(from), surface.alpha) / (k * k);
     for (let c = 0; c < 3; c++) {
       const f = table[3 * i + c] + (x - i) * (table[3 * i + 3 + c] - table[3 * i + c]);
-      const gloss = (f - surface.body[c]) * factor;
+      const gloss = Math.max(f - surface.body[c], 0) * factor;
+      // Where there is less than the body, all of it is body.
+      const body = Math.min(table[3 * n + c], surface.body[c]);
       const white = surface.f0[c] > own ? own / surface.f0[c] : 1;
-      out[3 * n + c] = tint[c] * albedo * (surface.body[c] + (1 - white) * gloss) + white * gloss;
+      out[3 * n + c] = tint[c] * albedo * (body + (1 - white) * gloss) + white * gloss;
     }
   }
   return out;

@@ -35,5 +35,6 @@ pub use content::{ColourSpace, Content, Document, Options, SAMPLES, name_of};
 pub use error::DocumentError;
 pub use open::{measured, open};
 pub use sample::write_sample;
+pub use texture::same_shape;
 
 pub use crate::materials::{Materials, Surface};

@@ -1,7 +1,7 @@
 //! Edits of one curve: rougher or glossier, tinted, lighter or darker.
 //!
 //! Problem: a basis is a curve over the half angle, without the parameters that people think in.
-//! Method: the [nearest](Nearest) body and lobe split the curve `f` into a flat body and its gloss `g = f - body`.
+//! Method: the [nearest](Nearest) body and lobe split the curve `f` into a flat body, or all of `f` where it has less, and gloss `g = f - body`.
 //! *Rougher by k* tilts every microfacet k times as steeply: the distribution of slopes, `g cos^6 / G`, is stretched by k
 //! along tan theta and lowered by k^2, so it still covers the unit disc once, and what shadowing G takes follows the new
 //! width. For a GGX lobe of width alpha this is the lobe of width k alpha. *Tint* and *albedo* multiply the base colour of
@@ -127,14 +127,15 @@ impl Surface {
         let mut out = row.to_vec();
         for (c, &tint) in tint.iter().enumerate() {
             let channel: Vec<f64> = row.iter().skip(c).step_by(3).copied().collect();
-            let least = channel.iter().copied().fold(f64::INFINITY, f64::min);
-            let body = (found.diffuse[c] / std::f64::consts::PI).min(least);
-            let gloss: Vec<f64> = channel.iter().map(|f| f - body).collect();
+            // Where there is less than the body, all of it is body.
+            let body: Vec<f64> =
+                channel.iter().map(|f| f.min(found.diffuse[c] / std::f64::consts::PI)).collect();
+            let gloss: Vec<f64> = channel.iter().zip(&body).map(|(f, body)| f - body).collect();
             let gloss = stretched(space.angles(), &gloss, found.alpha, alpha);
             let colour = tint * albedo;
             let own = DIELECTRIC * (1.0 - metallic.metallic);
             let white = if found.f0[c] > own { own / found.f0[c] } else { 1.0 };
-            for (out, g) in out.iter_mut().skip(c).step_by(3).zip(gloss) {
+            for (out, (g, body)) in out.iter_mut().skip(c).step_by(3).zip(gloss.iter().zip(body)) {
                 *out = colour * (body + (1.0 - white) * g) + white * g;
             }
         }

@@ -12,6 +12,8 @@ use crate::document::foil;
 use crate::materials::Factored;
 use crate::weights::{ONE, WeightMaps, quantise};
 
+mod every_basis;
+
 const SIZE: (usize, usize) = (6, 5);
 
 fn value(seed: u32, i: usize) -> f64 {

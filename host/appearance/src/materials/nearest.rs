@@ -5,7 +5,9 @@
 //! channel by channel, on the metric linearised at the curve, neither below 0. Alpha is the same for all channels and found by
 //! a scan of [`STEPS`] widths and a golden-section search between the neighbours of the best; both judge by the metric itself.
 //! For pictures, [`Widths`] judges by the linearised metric, among widths whose lobes are prepared.
-//! Cost: some 60 distances, or [`Widths`] some 20 sums. A curve that has this form is found to 1e-6.
+//! A curve that falls to nothing where others are light, as a basis less some of another may, has infinite slopes there, which would leave
+//! black as the nearest surface. If less than half the distance is left when what is darker than the mean counts like the mean, that is taken.
+//! Cost: twice some 60 distances, or [`Widths`] some 20 sums. A curve that has this form is found to 1e-6.
 //! Limits: one lobe. Of two, it is the one that is seen most; [`Nearest::distance`] says what is missing.
 
 use std::f64::consts::PI;
@@ -78,7 +80,13 @@ pub struct Near {
 impl Nearest {
     /// The nearest surface to a row (1/sr) of a half-angle space.
     pub fn to(space: &Space, row: &[f64]) -> Nearest {
-        let target = Target::new(space, row);
+        let found = Nearest::by(&Target::new(space, row));
+        let level = Nearest::by(&Target::above(space, row, mean(space, row)));
+        if level.distance < 0.5 * found.distance { level } else { found }
+    }
+
+    /// The nearest by the linearised metric of a target.
+    fn by(target: &Target) -> Nearest {
         let width = |step: f64| ALPHA.start() * (ALPHA.end() / ALPHA.start()).powf(step / (STEPS - 1) as f64);
         let tried = (0..STEPS).map(|step| target.fitted(width(step as f64)));
         let (best, found) = tried
@@ -179,6 +187,13 @@ impl<'a> Widths<'a> {
     }
 }
 
+/// The value (1/sr) whose cube root is the mean of those of a row, as the metric weighs them; above 0.
+fn mean(space: &Space, row: &[f64]) -> f64 {
+    let weights = || space.weight().iter().zip(space.radiance()).map(|(w, c)| (w * c.cbrt()).powi(2));
+    let sum: f64 = row.iter().zip(weights()).map(|(f, w)| w * f.max(0.0).cbrt()).sum();
+    (sum / weights().sum::<f64>().max(f64::MIN_POSITIVE)).powi(3) + 1e-12
+}
+
 fn lobe(space: &Space, alpha: f64) -> Vec<f64> {
     space.angles().iter().map(|&t| inks::ggx::lobe(t, alpha)).collect()
 }
@@ -189,8 +204,13 @@ fn with_lobe(diffuse: &[f64; 3], f0: &[f64; 3], lobe: &[f64]) -> Vec<f64> {
 
 impl<'a> Target<'a> {
     fn new(space: &'a Space, row: &'a [f64]) -> Target<'a> {
-        // The slope of cbrt(f c) is c^(1/3) f^(-2/3) / 3. Below a millionth of the peak it is that of the millionth.
-        let floor = row.iter().copied().fold(0.0, f64::max) * 1e-6 + 1e-12;
+        // Below a millionth of the peak the slope is that of the millionth.
+        Target::above(space, row, row.iter().copied().fold(0.0, f64::max) * 1e-6 + 1e-12)
+    }
+
+    /// With the slope of the floor below it.
+    fn above(space: &'a Space, row: &'a [f64], floor: f64) -> Target<'a> {
+        // The slope of cbrt(f c) is c^(1/3) f^(-2/3) / 3.
         let columns = row.iter().zip(space.weight().iter().zip(space.radiance()));
         let weight =
             columns.map(|(&f, (w, c))| (w * c.cbrt()).powi(2) * f.max(floor).powf(-4.0 / 3.0)).collect();

@@ -194,6 +194,36 @@ mod tests {
         sides.iter().all(|s| *s >= 0.0) || sides.iter().all(|s| *s <= 0.0)
     }
 
+    /// What is refused at the faintest contrast is refused at one a fifth lower or higher, whatever inks are at hand.
+    #[test]
+    fn inks_show_both_pictures_or_hardly_anything() {
+        let mut shown = [0, 0];
+        for inks in [
+            "C",
+            "K",
+            "process",
+            "process,white",
+            "K,F",
+            "C,F",
+            "process,finish",
+            "K,MS",
+            "K,MS,F",
+            "process,MS",
+            "W,MS",
+            "default",
+            "all",
+        ] {
+            let (printable, space) = printable(inks);
+            let contrast =
+                reach(&printable, &space).map_or(0.0, |found| found.contrast[0].min(found.contrast[1]));
+            println!("{inks}: {contrast:.3}");
+            let [lower, higher] = [0.8, 1.2].map(|factor| contrast < factor * crate::views::FAINTEST);
+            assert_eq!(lower, higher, "{inks}: {contrast}");
+            shown[usize::from(lower)] += 1;
+        }
+        assert!(shown.iter().all(|&sets| sets >= 2), "{shown:?}");
+    }
+
     #[test]
     fn no_other_choice_of_stacks_shows_both_pictures_better() {
         for inks in ["process,finish", "K,MS,SF,F,W", "all"] {

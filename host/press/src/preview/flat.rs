@@ -67,7 +67,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// Places averaged along each axis of a pixel if a document is finer than the picture.
-const DOCUMENT_SAMPLES: usize = 4;
+pub(super) const DOCUMENT_SAMPLES: usize = 4;
 
 /// Renders `source` as `width` x `height` pixels, one picture for each of `lights`.
 ///
@@ -123,7 +123,7 @@ pub fn flat(
 }
 
 /// What pixels are mixed of, between the samples.
-struct Curves {
+pub(super) struct Curves {
     fine: Fine,
     /// The table of each stack or basis.
     tables: Vec<Vec<[f32; 3]>>,
@@ -132,7 +132,7 @@ struct Curves {
 }
 
 impl Curves {
-    fn new(space: &Space, lines: &Lines) -> Curves {
+    pub fn new(space: &Space, lines: &Lines) -> Curves {
         let fine = Fine::new();
         let rows = lines.table().map_or_else(Vec::new, |table| table.rows().collect());
         let tables = rows.into_iter().map(|row| fine.table(&space.curve(row))).collect();
@@ -140,7 +140,7 @@ impl Curves {
     }
 
     /// The reflectance (1/sr) of a pixel at a half angle.
-    fn at(&self, theta: f64, mean: &Mean) -> [f32; 3] {
+    pub fn at(&self, theta: f64, mean: &Mean) -> [f32; 3] {
         match mean {
             Mean::Shares(shares) => {
                 let (k, s) = self.fine.at((2.0 * (0.5 * theta).sin()) as f32);

@@ -3,7 +3,7 @@
 //! Problem: owners know 20, 60 and 85 degree readings, and nobody reads gloss from a distance d.
 //! Method: [`inks::gloss::of_curve`] reads the curves of target and print. Words follow ISO 2813, which measures at 85 degrees below
 //! 10 units at 60 degrees and at 20 degrees above 70. A target whose peak is below that of every stack at hand is matter than any ink.
-//! Cost: 4096 evaluations of a curve for each reading. Limits: those of [`inks::gloss::of_curve`]; two lobes over each other read up to
+//! Cost: about 1 ms for each curve: one split, and 4096 evaluations a reading. Limits: those of [`inks::gloss::of_curve`]; two lobes over each other read up to
 //! 1.3 units less at 85 degrees.
 
 use appearance::brdf::Space;
@@ -38,7 +38,7 @@ fn peak(row: &[f64]) -> f64 {
 impl Gloss {
     /// Of a material, among stacks with this [lowest peak](lowest_peak).
     pub fn of(space: &Space, material: &MaterialReport, lowest: f64) -> Gloss {
-        let read = |row: &[f64]| GEOMETRIES.map(|geometry| of_curve(geometry, &space.curve(row)));
+        let read = |row: &[f64]| of_curve(GEOMETRIES, &space.curve(row));
         Gloss {
             target: read(&material.target),
             printed: read(&material.printed),

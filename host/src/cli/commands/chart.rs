@@ -2,12 +2,15 @@
 
 use anyhow::{Context, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
+use image::ImageFormat;
 use inks::{InkSet, Library, Stack};
 use protocol::ink::Ink;
 use serde_json::Value;
 
 use crate::cli::arguments::layout::MediaArgs;
 use crate::cli::arguments::{HalftoneArg, InkArgs};
+use crate::cli::commands::preview::figure::mirroring;
+use crate::cli::output::Staged;
 use crate::cli::printing::deliver::DeliverArgs;
 use crate::cli::printing::{Artwork, JobArgs, ResultArgs};
 use art::names::typed;
@@ -88,6 +91,9 @@ struct Ramp {
     first: Stack,
     /// Stack on the right
     second: Stack,
+    /// Draw the ramp before a checkerboard that it mirrors, too: figure 2 of the 2009 paper (.png)
+    #[arg(long, value_name = "FILE.png")]
+    figure: Option<std::path::PathBuf>,
     #[command(flatten)]
     halftone: HalftoneArg,
     #[command(flatten)]
@@ -179,20 +185,31 @@ const USUAL: &str = "process,metallic-silver,metallic-gold,finish";
 /// Runs `chart`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     match &args.chart {
-        Chart::Ramp(Ramp { first, second, halftone, step }) => {
+        Chart::Ramp(Ramp { first, second, figure, halftone, step }) => {
             let make = |library: &Library| {
-                chart::ramp(first, second, halftone.halftone.unwrap_or_default(), library, observer)
+                let dots =
+                    chart::ramp(first, second, halftone.halftone.unwrap_or_default(), library, observer)?;
+                if let Some(path) = figure {
+                    let (staged, ramp) = (Staged::file(path)?, chart::ramp::parts().ramp);
+                    let name = format!("{first} to {second}");
+                    let picture = mirroring(&name, &dots, ramp, library, observer)?;
+                    picture
+                        .save_with_format(staged.path(), ImageFormat::Png)
+                        .with_context(|| format!("cannot write {}", path.display()))?;
+                    staged.commit()?;
+                }
+                Ok(dots)
             };
             step.run("ramp", chart::ramp::parts().size, make, [first, second], observer)
         }
         Chart::Ladder(Ladder { glossy, dull, halftone, step }) => {
             let make = |library: &Library| {
-                chart::ladder(glossy, dull, halftone.halftone.unwrap_or_default(), library, observer)
+                Ok(chart::ladder(glossy, dull, halftone.halftone.unwrap_or_default(), library, observer)?)
             };
             step.run("ladder", chart::size_of_ladder(), make, [glossy, dull], observer)
         }
         Chart::Halftone(Halftone { first, second, step }) => {
-            let make = |library: &Library| chart::halftones(first, second, library, observer);
+            let make = |library: &Library| Ok(chart::halftones(first, second, library, observer)?);
             step.run("halftone", chart::size_of_halftones(first, second), make, [first, second], observer)
         }
         Chart::Stacks(stacks) => {
@@ -305,7 +322,7 @@ impl StepArgs {
         &self,
         name: &'static str,
         size: (usize, usize),
-        make: impl FnOnce(&Library) -> Result<DotMap, chart::ChartError>,
+        make: impl FnOnce(&Library) -> Result<DotMap>,
         [first, second]: [&Stack; 2],
         observer: &dyn Observer,
     ) -> Result<()> {

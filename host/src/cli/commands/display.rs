@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use appearance::brdf::Space;
-use appearance::document::{Document, SAMPLES, name_of};
+use appearance::document::{Document, SAMPLES, name_of, same_shape};
 use appearance::materials::{Materials, Reduced, resolution};
 use clap::Args as ClapArgs;
 use inks::{InkSet, Library, Stack};
@@ -184,12 +184,6 @@ fn size(materials: &dyn Materials) -> (usize, usize) {
     (materials.width(), materials.height())
 }
 
-/// Whether one picture covers another within a pixel of the smaller one.
-fn same_proportions(large: (usize, usize), small: (usize, usize)) -> bool {
-    let (across, down) = (large.0 * small.1, large.1 * small.0);
-    across.abs_diff(down) <= large.0.max(large.1)
-}
-
 /// An image's name without its folders, as it stands on the page.
 fn shown_name(name: &str) -> String {
     name_of(Path::new(name))
@@ -210,7 +204,7 @@ impl Args {
             bail!("no image to show")
         };
         // Larger images are averaged to the pixels of the smallest.
-        if let Some(other) = sizes.iter().position(|&size| !same_proportions(size, first)) {
+        if let Some(other) = sizes.iter().position(|&size| !same_shape(size, first)) {
             bail!(
                 "{}: {} x {} pixels, but {} has {} x {}; all images of a display have the same proportions, so crop one",
                 self.images[other],

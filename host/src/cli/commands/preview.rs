@@ -1,6 +1,6 @@
 //! `foilpress preview`: a document or a sheet as it looks, under any light and from any direction.
 
-mod figure;
+pub mod figure;
 pub mod subject;
 pub mod view;
 mod wear;

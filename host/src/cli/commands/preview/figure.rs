@@ -3,7 +3,8 @@
 use std::borrow::Cow;
 
 use anyhow::Result;
-use appearance::brdf::{Table, reflectances};
+use appearance::brdf::{Space, Table, reflectances};
+use appearance::document::SAMPLES;
 use appearance::factor::Factored;
 use appearance::gamut::{self, GamutSettings, Gloss, Intent, Mapped, Printable};
 use clap::ValueEnum;
@@ -11,9 +12,10 @@ use image::RgbImage;
 use inks::Library;
 use observe::Observer;
 use press::preview::figures::{SIX_LIGHTS, balls_picture, bases_alone, weights_picture};
-use press::preview::{Panels, Probe, Source};
-use sheet::Area;
+use press::preview::{Panels, Probe, Source, near_picture};
+use sheet::{Area, DotMap};
 
+use super::subject::{printed, printed_name};
 use crate::cli::arguments::document_dots::DotsArgs;
 
 /// Which one.
@@ -25,10 +27,15 @@ pub enum Figure {
     Balls,
     /// Document over print under six lights, from above down to 15 degrees (figure 11)
     Lights,
+    /// The print and a checkerboard behind it, which it mirrors (figure 2)
+    Near,
 }
 
 /// Draws a figure of a document.
 pub fn figure(figure: Figure, work: &DotsArgs, probe: &Probe, observer: &dyn Observer) -> Result<RgbImage> {
+    if figure == Figure::Near {
+        return near(work, observer);
+    }
     let prepared = work.document_dots(observer)?;
     let name = &prepared.document.name;
     if figure == Figure::Lights {
@@ -60,14 +67,57 @@ pub fn figure(figure: Figure, work: &DotsArgs, probe: &Probe, observer: &dyn Obs
     let columns = [
         ("document", alone.bases.clone()),
         ("stacks in use", stacks(&mapped, &prepared.library, &alone)),
-        ("clamped", printed(&clamped, &prepared.library, &alone)),
-        ("mapped", printed(&mapped, &prepared.library, &alone)),
+        ("clamped", mixed(&clamped, &prepared.library, &alone)),
+        ("mapped", mixed(&mapped, &prepared.library, &alone)),
     ];
     Ok(balls_picture(name, &bases.space, &columns, probe, observer)?)
 }
 
+/// What a print mirrors: of a document, a job or a sheet.
+fn near(work: &DotsArgs, observer: &dyn Observer) -> Result<RgbImage> {
+    let path = work.document.path();
+    if let Some(dots) = printed(path, observer)? {
+        return mirroring(&printed_name(path), &dots, inked(&dots), &work.inks.library()?, observer);
+    }
+    let prepared = work.document_dots(observer)?;
+    let dots = &prepared.halftoned.dots;
+    mirroring(&prepared.document.name, dots, Area::whole(dots), &prepared.library, observer)
+}
+
+/// An area of dots before a checkerboard.
+pub fn mirroring(
+    name: &str,
+    dots: &DotMap,
+    area: Area,
+    library: &Library,
+    observer: &dyn Observer,
+) -> Result<RgbImage> {
+    let space = Space::half_angle(SAMPLES);
+    let stacks = reflectances(dots.stacks(), library, &space);
+    let print = Source::Print { dots, space: &space, stacks: &stacks, area };
+    Ok(near_picture(name, &print, observer)?)
+}
+
+/// The part of a page that has ink; all of one that has none.
+fn inked(dots: &DotMap) -> Area {
+    let bare: Vec<bool> = dots.stacks().iter().map(|stack| stack.layers().is_empty()).collect();
+    let has_ink = |&stack: &u8| !bare[usize::from(stack)];
+    let rows = || dots.index().chunks_exact(dots.width().max(1));
+    let first = |row: &[u8]| row.iter().position(has_ink);
+    let last = |row: &[u8]| row.iter().rposition(has_ink);
+    let (Some(top), Some(bottom), Some(left), Some(right)) = (
+        rows().position(|row| row.iter().any(has_ink)),
+        rows().rposition(|row| row.iter().any(has_ink)),
+        rows().filter_map(first).min(),
+        rows().filter_map(last).max(),
+    ) else {
+        return Area::whole(dots);
+    };
+    Area { left, top, width: right + 1 - left, length: bottom + 1 - top }
+}
+
 /// What the mixture of each pixel reflects.
-fn printed(mapped: &Mapped, library: &Library, document: &Factored) -> Table {
+fn mixed(mapped: &Mapped, library: &Library, document: &Factored) -> Table {
     let curves = reflectances(&mapped.mix.stacks, library, &document.space);
     let mut rows = Table::new(document.space.columns());
     let mut shares = vec![0.0; curves.len()];
@@ -97,4 +147,19 @@ fn stacks(mapped: &Mapped, library: &Library, document: &Factored) -> Table {
     let mut rows = Table::new(document.space.columns());
     order.into_iter().for_each(|k| rows.push(curves.row(k)));
     rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use inks::Stack;
+
+    #[test]
+    fn a_page_is_cut_to_its_ink() {
+        let page =
+            |index: Vec<u8>| DotMap::new(5, 4, vec![Stack::SUBSTRATE, "K".parse().unwrap()], index).unwrap();
+        let index = (0..20).map(|i| u8::from(i == 7 || i == 13)).collect();
+        assert_eq!(inked(&page(index)), Area { left: 2, top: 1, width: 2, length: 2 });
+        assert_eq!(inked(&page(vec![0; 20])), Area { left: 0, top: 0, width: 5, length: 4 });
+    }
 }
