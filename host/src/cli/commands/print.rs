@@ -114,21 +114,21 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let (made, seen) = rayon::join(
         || printing::make(&args.work.request(&prepared), &notes, &[], places, ground, observer),
         || {
-            // First, so that the mixture is given back before anything large is drawn.
-            let halftone = Halftone::measured(&prepared, &mix, &beside);
-            let shown = PreviewSubject::of(
-                &prepared,
-                &mix,
-                prepared.document.as_factored().cloned(),
-                &args.work.dots,
-            );
-            drop(mix);
-            let page = || shown.page(&ViewArgs::default(), None, &beside);
-            (halftone, rayon::join(|| Pictures::new(&prepared, &probe, &beside), page))
+            let rest = || {
+                let halftone = Halftone::measured(&prepared, &mix, &beside)?;
+                let shown = PreviewSubject::of(
+                    &prepared,
+                    &mix,
+                    prepared.document.as_factored().cloned(),
+                    &args.work.dots,
+                );
+                drop(mix);
+                Ok::<_, anyhow::Error>((halftone, shown.page(&ViewArgs::default(), None, &beside)?))
+            };
+            rayon::join(|| Pictures::new(&prepared, &probe, &beside), rest)
         },
     );
-    let (halftone, (pictures, looked_at)) = seen;
-    let (made, halftone, pictures, looked_at) = (made?, halftone?, pictures?, looked_at?);
+    let (made, pictures, (halftone, looked_at)) = (made?, seen.0?, seen.1?);
     let sheet = pictures.sheet(&prepared, made.job.draft.separation.passes.len())?;
     let save = |name: &str, picture: &RgbImage| {
         picture.save(made.folder.join(name)).with_context(|| format!("cannot write {name}"))
