@@ -1,6 +1,7 @@
 //! The claims of section 4.1, figure 5's ladder, the limits, and the intents against each other.
 
 mod dark;
+mod needed;
 
 use inks::{Curve, InkSet, Library, Stack};
 use proptest::prelude::*;
