@@ -265,6 +265,11 @@ impl Release<'_> {
             let triple = system.triple.replace('-', "_");
             build.env(format!("CARGO_TARGET_{}_LINKER", triple.to_uppercase()), linker);
             build.env(format!("CC_{triple}"), linker);
+            if linker == "musl-gcc" {
+                // It brings no headers of the kernel, by which USB is spoken to: those of this machine, after its own.
+                let headers = "-idirafter /usr/include -idirafter /usr/include/x86_64-linux-gnu";
+                build.env(format!("CFLAGS_{triple}"), headers);
+            }
         }
         succeed(&mut build)?;
         Ok(firmware::workspace_target(self.root).join(system.triple).join("release"))

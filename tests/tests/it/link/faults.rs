@@ -388,8 +388,8 @@ impl Bench {
             run = self.start(&["cancel"]);
             self.until("the bridge", &mut run, |_, run| run.said().contains("firmware"));
         }
-        // The bridge has to hear of it before the printer goes on.
-        std::thread::sleep(Duration::from_millis(1000));
+        // The bridge has to hear of it before the printer goes on, on a busy computer too.
+        std::thread::sleep(Duration::from_millis(3000));
         run
     }
 
