@@ -263,12 +263,14 @@ impl Release<'_> {
         }
         if let Some((linker, _)) = system.linker {
             let triple = system.triple.replace('-', "_");
-            build.env(format!("CARGO_TARGET_{}_LINKER", triple.to_uppercase()), linker);
             build.env(format!("CC_{triple}"), linker);
-            if linker == "musl-gcc" {
-                // It brings no headers of the kernel, by which USB is spoken to: those of this machine, after its own.
+            if system.form == Form::Tar {
+                // Rust brings its own start of a static program, with which `musl-gcc` does not link. What that lacks for C are the headers
+                // of the kernel, by which USB is spoken to: those of this machine, after its own.
                 let headers = "-idirafter /usr/include -idirafter /usr/include/x86_64-linux-gnu";
                 build.env(format!("CFLAGS_{triple}"), headers);
+            } else {
+                build.env(format!("CARGO_TARGET_{}_LINKER", triple.to_uppercase()), linker);
             }
         }
         succeed(&mut build)?;
