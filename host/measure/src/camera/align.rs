@@ -169,28 +169,48 @@ impl Tones {
         }
     }
 
+    /// The light of each channel between pixels; `None` outside, and beside what is full.
+    fn between(&self, x: f64, y: f64) -> Option<[f32; 3]> {
+        let (u, v) = ((x - x.floor()) as f32, (y - y.floor()) as f32);
+        let mut sum = [0.0; 3];
+        for (i, j, part) in
+            [(0, 0, (1.0 - u) * (1.0 - v)), (1, 0, u * (1.0 - v)), (0, 1, (1.0 - u) * v), (1, 1, u * v)]
+        {
+            let (x, y) = (x.floor() as i64 + i, y.floor() as i64 + j);
+            // What does not count may be missing.
+            if part < 1e-6 {
+                continue;
+            }
+            if !(0..self.width as i64).contains(&x) || !(0..self.height as i64).contains(&y) {
+                return None;
+            }
+            let i = y as usize * self.width + x as usize;
+            if self.light[i].is_nan() {
+                return None;
+            }
+            sum.iter_mut().zip(self.channels[i]).for_each(|(sum, light)| *sum += part * light);
+        }
+        Some(sum)
+    }
+
     /// How red and blue over green differ in even places that noise does not hide; 0 where there are too few.
     fn balance(&self, other: &Tones, logs: &Logs, shift: [f64; 2]) -> [(f64, f64); 2] {
         let mut found: [Vec<f64>; 3] = Default::default();
         for y in 1..self.height as i64 - 1 {
             for x in 1..self.width as i64 - 1 {
-                let (u, v) = ((x as f64 + shift[0]).round(), (y as f64 + shift[1]).round());
-                if u < 0.0 || v < 0.0 || u >= self.width as f64 || v >= self.height as f64 {
-                    continue;
-                }
-                let (i, j) = (y as usize * self.width + x as usize, v as usize * self.width + u as usize);
+                let i = y as usize * self.width + x as usize;
                 let here = logs.at(x, y);
                 let even = [(1, 0), (-1, 0), (0, 1), (0, -1)]
                     .iter()
                     .all(|(k, l)| (logs.at(x + k, y + l) - here).abs() < EVEN);
-                if !even || other.light[j].is_nan() {
-                    continue;
-                }
+                // The very place: from pixel to pixel an even place may still change by more than a white balance does.
+                let there = other.between(x as f64 + shift[0], y as f64 + shift[1]);
+                let (true, Some(there)) = (even, there) else { continue };
                 // The longer exposure's neighbours choose: a place's own noise would choose what is too bright in it.
                 let ln = |c: usize| {
                     let near = [i - 1, i + 1, i - self.width, i + self.width];
                     let level = near.iter().map(|&i| self.channels[i][c]).sum::<f32>() / 4.0;
-                    let (a, b) = (self.channels[i][c], other.channels[j][c]);
+                    let (a, b) = (self.channels[i][c], there[c]);
                     let clear = (CLEAR as f32) * self.floors[c].max(other.floors[c]);
                     (level > clear && a > 0.0 && b > 0.0).then(|| f64::from((b / a).ln()))
                 };

@@ -2,7 +2,8 @@
 //!
 //! Problem: no exposure shows a foil's highlight and the grey card at once. Method: maximum likelihood for shot and read noise,
 //! `L = sum w v/t / sum w` with `w = t^2 / (gain L t + read)`; values above 97 % of the sensor's range are missing. Exposures come
-//! longest first, so that each is weighted by what the longer ones said, and noise does not choose its own weight. Where even
+//! longest first, so that each is weighted by what the longer ones said, the first by what is around a pixel, and noise does not choose
+//! its own weight: pixels that it makes dark would count most wherever pixels are averaged. Where even
 //! the shortest is full, its value is a lower bound and marked as one. Exposure ratios and shifts are refined between
 //! neighbours in exposure; shifted photographs are read by Catmull and Rom's interpolation.
 //! Cost: every file is read twice; memory for one picture of sums and two photographs.
@@ -274,11 +275,16 @@ impl Sums {
             }
             Some(sum)
         };
-        // The least that a full pixel may be: the sensor's limit, after the frames.
-        let limit = |x: usize, y: usize, c: usize| {
+        // A value beside a pixel of the series.
+        let near = |x: usize, y: usize, c: usize, [i, j]: [i64; 2]| {
             let near =
                 |at: usize, base: i64, most: usize| (at as i64 + base).clamp(0, most as i64 - 1) as usize;
-            CLIPPED * photo.at(3 * (near(y, base[1], height) * width + near(x, base[0], width)) + c)
+            photo.at(3 * (near(y, base[1] + j, height) * width + near(x, base[0] + i, width)) + c)
+        };
+        // The least that a full pixel may be: the sensor's limit, after the frames.
+        let limit = |x: usize, y: usize, c: usize| CLIPPED * near(x, y, c, [0, 0]);
+        let around = |x: usize, y: usize, c: usize| {
+            [[-1, 0], [1, 0], [0, -1], [0, 1]].map(|beside| near(x, y, c, beside)).iter().sum::<f32>() / 4.0
         };
         let rows = value
             .par_chunks_mut(3 * width)
@@ -311,7 +317,12 @@ impl Sums {
                             first[x] = own;
                         }
                         let v = response.linear(c, code);
-                        let expected = if weight[i] > 0.0 { value[i] / weight[i] * time } else { v };
+                        let (expected, code) = if weight[i] > 0.0 {
+                            (value[i] / weight[i] * time, code)
+                        } else {
+                            let code = around(x, y, c);
+                            (response.linear(c, code), code)
+                        };
                         let step = response.step(c, code);
                         let variance = (noise.variance(expected) + step * step / 6.0).max(1e-20);
                         if weight[i] > 0.0 && expected * expected < DARK * DARK * variance {

@@ -92,6 +92,24 @@ fn dark_ground_is_not_made_brighter_by_short_exposures() {
     assert!((sum / expected - 1.0).abs() < 0.005, "{}", sum / expected);
 }
 
+/// The mean of least variance of dark ground of which there is no long exposure: a pixel that noise makes dark is no surer than one that it
+/// makes bright.
+#[test]
+fn noise_does_not_choose_its_own_weight() {
+    let folder = tempfile::tempdir().unwrap();
+    let times = [0.25, 0.06, 0.015];
+    let exposures = times.map(|t| photograph(folder.path(), &format!("t{t}.png"), t, 30.0, (0, 0), false));
+    let (radiance, _) = merged(exposures.to_vec()).unwrap();
+    let (mut sum, mut weight) = (0.0, 0.0);
+    for (x, y) in (0..40).flat_map(|x| (0..240).map(move |y| (x, y))) {
+        let (i, expected) = (3 * (y * 320 + x) as usize + 1, 20_000.0 * times[0] * light(x, y, 30.0));
+        let w = expected * expected / f64::from(radiance.variance[i]);
+        sum += w * f64::from(radiance.value[i]) / expected;
+        weight += w;
+    }
+    assert!((sum / weight - 1.0).abs() < 0.01, "{}", sum / weight);
+}
+
 #[test]
 fn without_a_short_exposure_the_brightest_are_lower_bounds() {
     let folder = tempfile::tempdir().unwrap();
