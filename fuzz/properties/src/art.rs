@@ -6,7 +6,7 @@
 
 use std::io::{Cursor, Write as _};
 
-use art::{Artwork, Options, Room};
+use art::{Artwork, Options, Room, Settings};
 use observe::Silent;
 use zip::write::SimpleFileOptions;
 
@@ -65,7 +65,11 @@ fn holds(art: &Artwork) {
     let (width, length) = protocol::paper::LARGEST;
     assert!((1..=usize::from(width)).contains(&art.width) && (1..=usize::from(length)).contains(&art.length));
     assert_eq!((art.drawn.width, art.drawn.length), (art.width, art.length));
-    assert!(art.drawn.dots() > 0, "art without a dot is an error");
+    if art.drawn.dots() == 0 {
+        let composed = art::compose(art, &Settings::default(), &inks::Library::builtin(), &Silent);
+        let error = composed.expect_err("art without a dot is an error").to_string();
+        assert!(error.contains("nothing to print"), "{error}");
+    }
     assert!(art.notes.iter().all(|note| !note.is_empty()));
     assert!(!art.name.chars().any(char::is_control));
 }

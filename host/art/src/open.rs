@@ -38,8 +38,8 @@ const MOST_FILES: usize = 64;
 /// layers, a PDF or PostScript page, or one picture.
 ///
 /// # Errors
-/// Damaged files, unknown inks, layers of different sizes, art without a size, art without a dot. Each error names the
-/// file and what to do.
+/// Damaged files, unknown inks, layers of different sizes, art without a size. Each error names the file and what to do. Art without a
+/// dot is left to [`compose`](super::compose()).
 pub fn open(paths: &[PathBuf], options: &Options, observer: &dyn Observer) -> Result<Artwork, Diagnosis> {
     for path in paths {
         // A pipe would be waited for.
