@@ -16,7 +16,7 @@ use device::connection::transport::{Socket, Transport};
 use press::simulate::{Carousel, Cartridge, Lever, Printer, STATUS_LENGTH, Trouble};
 use protocol::ink::Ink;
 use protocol::link::frame::{MAX, Reader};
-use protocol::link::message::{Answer, Fault, Lines, Usage};
+use protocol::link::message::{Answer, Fault, JobState, Lines, Usage};
 use protocol::runs::Decoder;
 
 /// How long the printer prints behind the last byte.
@@ -53,6 +53,8 @@ pub struct Port {
     pub resets: AtomicUsize,
     /// How many bytes had crossed the port at each reset.
     pub reset_at: Mutex<Vec<usize>>,
+    /// Where the bridge's job stands.
+    pub state: Mutex<JobState>,
     /// The link is cut.
     pub cut: AtomicBool,
     /// Something that is no message comes out of the link at both ends.
@@ -89,6 +91,7 @@ impl Port {
             asked: 0.into(),
             resets: 0.into(),
             reset_at: Mutex::default(),
+            state: Mutex::new(JobState::None),
             cut: false.into(),
             garbage: false.into(),
             forget: false.into(),
@@ -307,6 +310,7 @@ fn serve(
             (false, true) => (Lines::IDLE, None),
         };
         engine.port(lines, fault);
+        *port.state.lock().expect("no test panicked with it") = engine.progress().state;
         let bytes = engine.output();
         let mut printed = port.printed.lock().expect("no test panicked with it");
         let waits = fault.is_some() || is(&port.busy) && !printed.is_empty();

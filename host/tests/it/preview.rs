@@ -394,6 +394,12 @@ fn figures_of_the_paper_are_pictures_of_any_document() {
         high / low
     };
     assert!(spread(80) > 1.3 * spread(450), "{} {}", spread(80), spread(450));
-    let refused = bench.run(&format!("preview tile {SMALL} --figure lights -o lights.html"));
-    assert!(!refused.status.success());
+    let drawn = format!("preview tile {SMALL} --figure lights -o lights.html");
+    for args in [&drawn, "chart ramp silver-foil metallic-silver -o other --figure ramp.jpg"] {
+        let refused = bench.run(args);
+        assert!(
+            !refused.status.success() && String::from_utf8_lossy(&refused.stderr).contains("name a .png")
+        );
+    }
+    assert!(!bench.path("other").exists());
 }

@@ -6,8 +6,9 @@
 //! a scan of [`STEPS`] widths and a golden-section search between the neighbours of the best; both judge by the metric itself.
 //! For pictures, [`Widths`] judges by the linearised metric, among widths whose lobes are prepared.
 //! A curve that falls to nothing where others are light, as a basis less some of another may, has infinite slopes there, which would leave
-//! black as the nearest surface. If less than half the distance is left when what is darker than the mean counts like the mean, that is taken.
-//! Cost: twice some 60 distances, or [`Widths`] some 20 sums. A curve that has this form is found to 1e-6.
+//! black as the nearest surface: where a difference is seen, it is fitted again with what is darker than the mean counting like the mean,
+//! and the nearer of both is taken.
+//! Cost: some 60 distances, twice that for what is fitted again, or [`Widths`] some 20 sums. A curve that has this form is found to 1e-6.
 //! Limits: one lobe. Of two, it is the one that is seen most; [`Nearest::distance`] says what is missing.
 
 use std::f64::consts::PI;
@@ -23,6 +24,9 @@ const ALSO: f64 = 1.1;
 
 /// The widths of lobes that a document may have.
 pub const ALPHA: std::ops::RangeInclusive<f64> = 0.02..=1.0;
+
+/// Distance at which a difference is barely visible.
+const BARELY: f64 = 0.01;
 
 /// Widths in the scan, in equal ratios.
 const STEPS: usize = 24;
@@ -81,8 +85,11 @@ impl Nearest {
     /// The nearest surface to a row (1/sr) of a half-angle space.
     pub fn to(space: &Space, row: &[f64]) -> Nearest {
         let found = Nearest::by(&Target::new(space, row));
+        if found.distance < BARELY {
+            return found;
+        }
         let level = Nearest::by(&Target::above(space, row, mean(space, row)));
-        if level.distance < 0.5 * found.distance { level } else { found }
+        if level.distance < found.distance { level } else { found }
     }
 
     /// The nearest by the linearised metric of a target.

@@ -26,8 +26,8 @@ pub(super) struct Hue {
     pub first: usize,
     /// For each configuration, the factor from radiance to its share in the mean.
     shares: Vec<f64>,
-    /// [`HUE`], or what a test puts in its place.
-    pub weight: f64,
+    /// [`HUE`], [`LIGHT`] and [`BLACK`], or what a test puts in their place.
+    pub constants: [f64; 3],
 }
 
 /// What is aimed at.
@@ -35,6 +35,7 @@ pub(super) struct Hue {
 pub(super) struct Aim {
     chromaticity: [f64; 3],
     weight: f64,
+    black: f64,
 }
 
 /// The hue of a mixture beside that aimed at.
@@ -45,10 +46,10 @@ pub(super) struct Missed {
     slope: f64,
 }
 
-/// Chromaticity of a reflectance, and its mean.
+/// Chromaticity of a reflectance to which so much is added, and its mean.
 #[inline(always)]
-fn chromaticity(f: [f64; 3]) -> ([f64; 3], f64) {
-    let f = f.map(|f| f + BLACK);
+fn chromaticity(f: [f64; 3], black: f64) -> ([f64; 3], f64) {
+    let f = f.map(|f| f + black);
     let mean = (f[0] + f[1] + f[2]) * (1.0 / 3.0);
     let per = 1.0 / mean;
     (f.map(|f| f * per), mean)
@@ -59,7 +60,7 @@ impl Hue {
     pub fn new(space: &Space, first: usize) -> Option<Hue> {
         let shares: Vec<f64> =
             space.dark().iter().zip(space.radiance().chunks_exact(3)).map(|(q, c)| q / c[0]).collect();
-        (!shares.is_empty()).then_some(Hue { first, shares, weight: HUE })
+        (!shares.is_empty()).then_some(Hue { first, shares, constants: [HUE, LIGHT, BLACK] })
     }
 
     /// The mean reflectance of a row of radiances.
@@ -74,8 +75,9 @@ impl Hue {
 
     /// What to aim at for a target of this mean reflectance.
     pub fn aim(&self, mean: [f64; 3]) -> Aim {
-        let (chromaticity, level) = chromaticity(mean);
-        Aim { chromaticity, weight: self.weight / (1.0 + level / LIGHT) }
+        let [hue, light, black] = self.constants;
+        let (chromaticity, level) = chromaticity(mean, black);
+        Aim { chromaticity, weight: hue / (1.0 + level / light), black }
     }
 }
 
@@ -83,7 +85,7 @@ impl Aim {
     /// The weighted difference of a mixture's hue, its slope, and `pull`, their product: half the gradient.
     #[inline(always)]
     pub fn compare(&self, mean: [f64; 3], residual: &mut [f64], pull: &mut [f64]) -> Missed {
-        let (chromaticity, level) = chromaticity(mean);
+        let (chromaticity, level) = chromaticity(mean, self.black);
         let slope = self.weight / level;
         let mut along = 0.0;
         for c in 0..3 {

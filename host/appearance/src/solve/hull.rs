@@ -198,13 +198,14 @@ impl Hull {
     /// The same without hue in the dark.
     #[cfg(test)]
     pub(crate) fn blind_to_hue(self) -> Hull {
-        self.with_hue(0.0)
+        self.with_hue([0.0, 1.0, 1.0])
     }
 
-    /// The same with hue weighed by a multiple of what it is.
+    /// The same with multiples of the weight of hue, of the light at which it counts half, and of what is added before it is compared.
     #[cfg(test)]
-    pub(crate) fn with_hue(mut self, times: f64) -> Hull {
-        self.hue.iter_mut().for_each(|hue| hue.weight *= times);
+    pub(crate) fn with_hue(mut self, times: [f64; 3]) -> Hull {
+        let constants = self.hue.iter_mut().flat_map(|hue| &mut hue.constants);
+        constants.zip(times).for_each(|(constant, times)| *constant *= times);
         self
     }
 

@@ -21,7 +21,7 @@ use crate::setup::Setup;
 pub struct Check {
     /// What is right.
     pub good: Vec<String>,
-    /// What to mend, the most important first.
+    /// What to mend, in the order in which it was found.
     pub mend: Vec<String>,
 }
 

@@ -92,7 +92,7 @@ struct Ramp {
     /// Stack on the right
     second: Stack,
     /// Draw the ramp before a checkerboard that it mirrors, too: figure 2 of the 2009 paper (.png)
-    #[arg(long, value_name = "FILE.png")]
+    #[arg(long, value_name = "FILE.png", value_parser = png)]
     figure: Option<std::path::PathBuf>,
     #[command(flatten)]
     halftone: HalftoneArg,
@@ -249,6 +249,12 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
             whole.print("heads", &dots, (inks, ON_HEADS), false, observer)
         }
     }
+}
+
+/// The name of a picture.
+fn png(name: &str) -> Result<std::path::PathBuf, String> {
+    let ends = name.to_ascii_lowercase().ends_with(".png");
+    if ends { Ok(name.into()) } else { Err("a figure is a picture; name a .png".into()) }
 }
 
 /// Inks of the strips if nobody says more.

@@ -33,7 +33,7 @@ use foilpress_tests::served::{Bridge, Port};
 use observe::Silent;
 use press::inspect::{inspect, sheets};
 use protocol::ink::Ink;
-use protocol::link::message::JobKind;
+use protocol::link::message::{JobKind, JobState};
 use std::fs::{self, File};
 use std::os::unix::fs::{PermissionsExt as _, chown};
 use std::os::unix::process::CommandExt as _;
@@ -386,10 +386,11 @@ impl Bench {
         } else {
             run.kill();
             run = self.start(&["cancel"]);
-            self.until("the bridge", &mut run, |_, run| run.said().contains("firmware"));
         }
-        // The bridge has to hear of it before the printer goes on, on a busy computer too.
-        std::thread::sleep(Duration::from_millis(3000));
+        // Before the printer goes on.
+        self.until("the bridge hears of it", &mut run, |bench, _| {
+            matches!(*bench.bridge.port.state.lock().unwrap(), JobState::Cancelling | JobState::Cancelled)
+        });
         run
     }
 
