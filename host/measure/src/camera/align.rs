@@ -157,12 +157,18 @@ impl Tones {
         // Sensors cut noise off at zero, which moves the edges of what is dark; how far depends on what is added to it.
         let (mut other_shift, mut other_ratio) = (shift, ratio);
         self.logs(MORE * little).converge(&other.logs(MORE * little), &mut other_shift, &mut other_ratio, 3);
-        let error: [f64; 2] = std::array::from_fn(|axis| {
-            self.factor as f64 * error[axis].hypot(other_shift[axis] - shift[axis])
-        });
-        let [red, blue] = self.balance(other, &a, shift);
+        let error: [f64; 2] = std::array::from_fn(|axis| error[axis].hypot(other_shift[axis] - shift[axis]));
+        let [mut red, mut blue] = self.balance(other, &a, shift);
+        // Colours are known no better than the place.
+        for axis in 0..2 {
+            let mut beside = shift;
+            beside[axis] += error[axis];
+            let [other_red, other_blue] = self.balance(other, &a, beside);
+            red.1 = red.1.hypot(other_red.0 - red.0);
+            blue.1 = blue.1.hypot(other_blue.0 - blue.0);
+        }
         Match {
-            shift_error: error,
+            shift_error: error.map(|error| self.factor as f64 * error),
             balance: [red.0, blue.0],
             balance_error: [red.1, blue.1],
             ..self.judge(other, (&a, &b), little, shift)
