@@ -214,7 +214,15 @@ impl<'d> Session<'d> {
 
     /// Whether [`Session::speak`] would have data to give out at once.
     pub fn has_more(&self) -> bool {
-        self.greeted && self.outcome().is_none() && self.progress.is_some_and(|p| self.next < p.limit)
+        self.greeted
+            && self.outcome().is_none()
+            && self.progress.is_some_and(|progress| self.gives(&progress))
+    }
+
+    /// Whether there are data to give. A cancelled job of which nothing has left goes no further: whether the printer is ready for it
+    /// was never asked.
+    fn gives(&self, progress: &Progress) -> bool {
+        self.next < progress.limit && !(self.record.cancel && self.record.phase == Phase::Begun)
     }
 
     /// Bytes from the link, in any portions.
@@ -433,7 +441,7 @@ impl<'d> Session<'d> {
             // Nothing was accepted for a while: something was lost, and the bridge does not know of it.
             self.next = progress.accepted;
         }
-        while self.next < progress.limit && out.len() < BURST {
+        while self.gives(&progress) && out.len() < BURST {
             if self.record.phase == Phase::Begun {
                 self.record.phase = Phase::Sending;
                 self.keep(save)?;

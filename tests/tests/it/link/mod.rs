@@ -10,9 +10,10 @@ mod paper;
 mod process;
 mod wire;
 
-use device::transit::session::{Outcome, Record, Session, SessionError};
+use device::transit::session::{Outcome, Phase, Record, Session, SessionError};
 use model::{ALL, Job, Mischief, NONE, is_a_whole_job, seeded};
-use protocol::link::message::JobKind;
+use protocol::link::frame::{self, MAX, Read, Reader};
+use protocol::link::message::{JobKind, JobState, Progress, SCHEMA, ToBridge, ToHost, VERSION};
 use rand::RngExt;
 use std::time::Duration;
 use wire::{Extra, World};
@@ -208,6 +209,44 @@ fn a_job_that_no_bridge_has_heard_of_is_cancelled_without_one() {
     let mut session = Session::new(Record::new(4, JobKind::Raw, 3), b"abc");
     session.cancel();
     assert_eq!(session.outcome(), Some(Outcome::Cancelled));
+}
+
+/// Nobody has asked whether the printer is ready for it, and its data would come behind whatever an earlier job has left there.
+#[test]
+fn a_cancelled_job_of_which_nothing_has_left_gives_no_data() {
+    let record = Record { phase: Phase::Begun, bridge: Some(2), ..Record::new(4, JobKind::Raw, 300) };
+    let shown =
+        Progress { job: 4, state: JobState::Printing, accepted: 0, limit: 300, printed: 0, pass: 0, row: 0 };
+    let hello = ToHost::Hello { version: VERSION, schema: SCHEMA, boot: 1, serial: 2, firmware: "test" };
+    for cancelled in [false, true] {
+        let mut session = Session::new(record, &[7; 300]);
+        if cancelled {
+            session.cancel();
+        }
+        session.connected(Duration::ZERO);
+        for message in [hello, ToHost::Progress(shown)] {
+            let mut buffer = [0; MAX];
+            let length = frame::write(&message, &mut buffer).unwrap();
+            session.hear(Duration::ZERO, &buffer[..length]).unwrap();
+        }
+        assert_eq!(session.has_more(), !cancelled);
+        let mut said = Vec::new();
+        let Ok(()) =
+            session.speak(Duration::ZERO, &mut said, &mut |_| Ok::<(), std::convert::Infallible>(()));
+        let (mut reader, mut rest, mut data, mut ends) = (Reader::new(), &said[..], false, false);
+        loop {
+            match reader.read(rest) {
+                Read::More => break,
+                Read::Damaged(_, more) => rest = more,
+                Read::Message(message, more) => {
+                    rest = more;
+                    data |= matches!(frame::decode(message), Ok(ToBridge::Data { .. }));
+                    ends |= matches!(frame::decode(message), Ok(ToBridge::Cancel { job: 4 }));
+                }
+            }
+        }
+        assert_eq!((data, ends), (!cancelled, cancelled));
+    }
 }
 
 #[test]
