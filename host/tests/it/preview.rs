@@ -52,8 +52,8 @@ fn dots_and_jobs_show_the_print_alone() {
     small_document(&bench.path("tile"));
     bench.done("print tile --size 12x8mm --paper postcard -q --to file:job.rgl");
     bench.done("preview job.rgl -q -o job.png --pixels 200");
-    // A job in the folder of a print has the document's name.
-    for (job, name) in [("job.rgl", "job"), ("tile.print/job.rgl", "tile")] {
+    // The folder of a print has the document's name, and so has the job in it.
+    for (job, name) in [("job.rgl", "job"), ("tile.print/job.rgl", "tile"), ("tile.print", "tile")] {
         bench.done(&format!("preview {job} -q -o page.html"));
         let page = fs::read_to_string(bench.path("page.html")).unwrap();
         assert!(page.contains(&format!("<title>{name}")), "{name}");

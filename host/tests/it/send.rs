@@ -60,6 +60,28 @@ impl Bench {
 }
 
 #[test]
+fn the_folder_of_a_print_stands_for_its_job_and_another_folder_for_none() {
+    let bench = Bench::new();
+    let path = |name: &str| bench.folder.path().join(name);
+    fs::create_dir(path("leaf.print")).unwrap();
+    fs::create_dir(path("empty")).unwrap();
+    fs::write(path("leaf.print/job.rgl"), &bench.job).unwrap();
+    bench.says(0, "send leaf.print --to file:out.rgl");
+    assert!(fs::read(path("out.rgl")).unwrap() == bench.job);
+    for command in ["inspect", "plan", "simulate -q -o sheet", "preview -q -o page.html"] {
+        bench.says(0, &format!("{command} leaf.print"));
+    }
+    for command in ["send --to file:other.rgl", "inspect", "simulate -o other.sheet"] {
+        let said = bench.says(1, &format!("{command} empty"));
+        assert!(
+            said.contains("empty: a folder without a job.rgl; expected a job (.rgl), or a folder"),
+            "{said}"
+        );
+    }
+    assert!(!path("other.rgl").exists() && !path("other.sheet").exists());
+}
+
+#[test]
 fn what_is_not_one_whole_job_is_refused_before_the_first_byte() {
     let bench = Bench::new();
     let mut port = bench.device();

@@ -9,7 +9,7 @@ use inks::Library;
 
 use crate::cli::arguments::document_dots::{DocumentDots, DotsArgs};
 use crate::cli::commands::preset::PresetArg;
-use crate::cli::commands::preview::subject::{printed, printed_name};
+use crate::cli::commands::preview::subject::{is_printed, printed, printed_name};
 use crate::cli::console::{print_job, show};
 use crate::cli::output::Staged;
 use appearance::factor::Factored;
@@ -113,7 +113,7 @@ impl Args {
             };
             return self.alone(job, observer);
         }
-        if self.job.is_none() && printed_alone(path) {
+        if self.job.is_none() && is_printed(path) {
             return self.alone(path, observer);
         }
         if self.dots.layout.mirror {
@@ -153,13 +153,6 @@ impl Args {
         let library = self.dots.inks.library()?;
         Ok(Work { name, sheet, library, document: None })
     }
-}
-
-/// Whether this is a job or a folder with a sheet.
-fn printed_alone(path: &Path) -> bool {
-    path.join("sheet.toml").is_file()
-        || path.join("dots.toml").is_file()
-        || path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("rgl"))
 }
 
 fn summary(comparison: &Comparison, output: &Path) -> String {

@@ -164,11 +164,5 @@ fn chart(path: &Path, observer: &dyn Observer) -> Result<Sheet> {
     if path.join("sheet.toml").is_file() {
         return Ok(Sheet::load(path)?);
     }
-    if path.is_dir() {
-        bail!(
-            "{}: has no sheet.toml; give the chart's job (.rgl), or a folder that `simulate` wrote",
-            path.display()
-        );
-    }
     print_job(path, observer)
 }

@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use crate::cli::commands::layers;
 use crate::cli::commands::print::Work;
-use crate::cli::console::read_job;
+use crate::cli::console::{job_in, read_job};
 use crate::cli::printing::plan_output::{DrawnPlan, PlanOutputArgs};
 use observe::Observer;
 use press::job::plan::{Plan, Subject};
@@ -131,10 +131,11 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     args.output.show(page, drawn, &Value::Null, "")
 }
 
-/// Whether a file begins like a job. All jobs begin with an escape; no document's file does.
+/// Whether this is the folder of a print, or a file that begins like a job. All jobs begin with an escape; no document's file does.
 fn is_job(path: &Path) -> bool {
     let mut first = [0];
     path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("rgl"))
+        || job_in(path).is_some()
         || (path.is_file()
             && File::open(path).and_then(|mut file| file.read_exact(&mut first)).is_ok()
             && first == *b"\x1b")

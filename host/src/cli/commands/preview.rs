@@ -48,7 +48,8 @@ enum Format {
     foilpress preview sample:leaf -o near.png --zoom 40 --middle 20x30mm --seen-from 0.5m\n  \
     foilpress preview sample:leaf -o leaf.glb                              (for other renderers)\n  \
     foilpress preview sample:dove -o dove.png --figure weights             (figures of the paper)\n\n\
-    DOC may also be a job (.rgl), or a folder written by `halftone`, `layout` or `simulate`; these show printed dots alone.\n\
+    DOC may also be a job (.rgl), or a folder written by `print`, `halftone`, `layout` or `simulate`;\n\
+    these show printed dots alone.\n\
     Angles are in degrees: the first to the right, the second upwards; 0,0 is straight above the sheet. All lights have the\n\
     same strength at the middle of the sheet. A page has controls for everything and shows the document, its mixture of\n\
     inks, the print, their difference, the stacks and the passes; it opens from a disk and needs no network."

@@ -24,7 +24,7 @@ use observe::Observer;
     other interruption `foilpress resume` continues it. A raw device cannot report what it has printed, so a job sent to \
     one cannot be resumed.")]
 pub struct Args {
-    /// Complete job in the printer's language
+    /// Complete job in the printer's language, or the folder that `print` or `layers` wrote
     #[arg(value_name = "JOB.rgl")]
     job: PathBuf,
     /// Destination: usb:, serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE, or file:PATH

@@ -11,7 +11,7 @@ pub use visible::{draw, say, show, stderr, stdout};
 use std::fmt;
 use std::fs::File;
 use std::io::{self, Read as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Error, Result, bail};
 use clap::error::ErrorKind;
@@ -37,8 +37,21 @@ pub fn usage(said: impl fmt::Display) -> Error {
     clap::Error::raw(ErrorKind::ValueValidation, format!("{}\n", visible(&said.to_string()))).into()
 }
 
-/// Reads a whole job from a file.
+/// The job in a folder that `print` or `layers` wrote.
+pub fn job_in(folder: &Path) -> Option<PathBuf> {
+    Some(folder.join("job.rgl")).filter(|job| job.is_file())
+}
+
+/// Reads a whole job from a file or from the folder of a print.
 pub fn read_job(path: &Path) -> Result<Vec<u8>> {
+    let inside = job_in(path);
+    let path = inside.as_deref().unwrap_or(path);
+    if path.is_dir() {
+        bail!(
+            "{}: a folder without a job.rgl; expected a job (.rgl), or a folder that `print` or `layers` wrote",
+            path.display()
+        );
+    }
     let cannot = || format!("cannot read {}", path.display());
     let file = File::open(path).with_context(cannot)?;
     let mut job = Vec::new();

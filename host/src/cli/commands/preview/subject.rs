@@ -24,7 +24,7 @@ use super::view::{Show, ViewArgs};
 use super::wear::Told;
 use crate::cli::arguments::FactorArgs;
 use crate::cli::arguments::document_dots::{DocumentDots, DotsArgs};
-use crate::cli::console::print_job;
+use crate::cli::console::{job_in, print_job};
 use crate::cli::{arguments::choice, output};
 
 /// Pixels of the longer side of the picture in the page.
@@ -242,7 +242,14 @@ fn word(text: &str) -> String {
     }
 }
 
-/// The dots of a job or of a folder with a sheet; nothing for a document.
+/// Whether this is a job, or a folder with one or with dots.
+pub fn is_printed(path: &Path) -> bool {
+    ["dots.toml", "sheet.toml"].iter().any(|name| path.join(name).is_file())
+        || job_in(path).is_some()
+        || path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("rgl"))
+}
+
+/// The dots of a job or of a folder with one or with a sheet; nothing for a document.
 pub fn printed(path: &Path, observer: &dyn Observer) -> Result<Option<DotMap>> {
     if path.join("dots.toml").is_file() {
         return Ok(Some(DotMap::load(path)?));
@@ -250,10 +257,7 @@ pub fn printed(path: &Path, observer: &dyn Observer) -> Result<Option<DotMap>> {
     if path.join("sheet.toml").is_file() {
         return Ok(Some(Sheet::load(path)?.dots().clone()));
     }
-    if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("rgl")) {
-        return Ok(None);
-    }
-    Ok(Some(print_job(path, observer)?.dots().clone()))
+    if is_printed(path) { Ok(Some(print_job(path, observer)?.dots().clone())) } else { Ok(None) }
 }
 
 /// The name of a job or of a folder with a sheet. `print` calls every job alike, but its folder by the document.
