@@ -18,7 +18,7 @@ use device::transit::finish::Sheet;
 use device::transit::journal::{Journal, fresh_number};
 use device::transit::session::{Outcome, Phase};
 use observe::{Observer, Silent};
-use protocol::link::message::{JobState, Progress};
+use protocol::link::message::{JobState, PAST, Progress};
 use std::cell::{Cell, RefCell};
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -373,7 +373,10 @@ pub fn told(world: &Shared, number: u32, outcome: Outcome) {
     let mut world = world.look();
     let Some(&known) = world.known.get(&number) else { return };
     let found = format!("job {number:08x} is told as {outcome:?}; {known:?}");
+    // A bridge remembers so many jobs, and whoever asks only behind them cannot be told.
+    let is_long_ago = world.known.values().filter(|other| other.order > known.order).count() >= PAST;
     let promise = match outcome {
+        Outcome::Forgotten if is_long_ago => return,
         Outcome::Printed if known.whole != 1 => Promise::PrintedIsAtThePrinter,
         Outcome::Lost | Outcome::Forgotten | Outcome::Broken if !world.harmed && !known.cancelled => {
             Promise::HarmlessCostsNothing
