@@ -95,7 +95,9 @@ impl Tones {
         let certain = CERTAIN * CERTAIN / blocks;
         let value = 0.5 * (certain * gain + (certain * gain * certain * gain + 4.0 * certain * read).sqrt());
         let value = value.max(0.004 * white[1].min(65_535.0));
-        let floors = std::array::from_fn(|c| response.linear(c, value / 3.0) / time);
+        // Eight bits are rounded coarsely where a curve is steep: what is black has other levels in every exposure.
+        let floors =
+            std::array::from_fn(|c| response.linear(c, value / 3.0).max(response.least(c, CERTAIN)) / time);
         let channels = probe
             .mean
             .iter()

@@ -52,6 +52,11 @@ pub(crate) fn links(
     observer: &dyn Observer,
 ) -> Result<Vec<Link>, MeasureError> {
     let strange = |found: &Match| found.compared >= COMPARABLE && found.strange > STRANGE;
+    let unrecovered = if matches!(response, Response::Linear) {
+        ""
+    } else {
+        ", or the response of these JPEG files could not be recovered (develop RAW to 16-bit TIFF)"
+    };
     let neighbours: Vec<Match> =
         (1..tones.len()).into_par_iter().map(|i| tones[i - 1].compare(&tones[i])).collect();
     let mut chain = vec![Link { shift: [0.0; 2], shift_error: [0.0; 2], ratio: 0.0 }];
@@ -85,11 +90,7 @@ pub(crate) fn links(
                     "shows something else than {other} ({:.0} % of the picture differs), so it belongs to another series, or the \
                      camera or the lamp was moved{}; take it away or photograph the series again",
                     100.0 * found.strange,
-                    if matches!(response, Response::Linear) {
-                        ""
-                    } else {
-                        ", or the response of these JPEG files could not be recovered (develop RAW to 16-bit TIFF)"
-                    }
+                    unrecovered
                 ),
             ));
         }
@@ -109,8 +110,8 @@ pub(crate) fn links(
             return Err(MeasureError::photo(
                 path,
                 format!(
-                    "its white balance is not that of {name}: {} is {:+.1} % of green off; fix the camera's white balance (and the lamp's colour), \
-                     or develop all photographs with the same one",
+                    "its white balance is not that of {name}: {} is {:+.1} % of green off{unrecovered}; fix the camera's white balance (and the \
+                     lamp's colour), or develop all photographs with the same one",
                     colour,
                     100.0 * found.balance[k].exp_m1()
                 ),

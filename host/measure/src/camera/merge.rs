@@ -43,6 +43,8 @@ pub struct Shot {
     pub shift_error: [f64; 2],
     /// Share of the pixels with a full channel.
     pub clipped: f64,
+    /// Its values are not proportional to light, so the camera's response was recovered.
+    pub recovered: bool,
     /// The f-number, where the file says it.
     pub aperture: Option<f64>,
     /// The sensitivity, where the file says it.
@@ -177,6 +179,7 @@ pub fn merge(
         .collect();
     let chain = chain::links(&exposures, &tones, size.0, &response, observer)?;
     let mut shots = Vec::new();
+    let recovered = !matches!(response, Response::Linear);
     let mut sums = Sums::new(size, noise, response);
     let times: Vec<f64> =
         relative.iter().zip(&chain).map(|(t, link)| t / relative[0] * link.ratio.exp()).collect();
@@ -198,6 +201,7 @@ pub fn merge(
             shift: chain[i].shift,
             shift_error: chain[i].shift_error,
             clipped,
+            recovered,
             aperture: exposure.exif.aperture,
             iso: exposure.exif.iso,
         });

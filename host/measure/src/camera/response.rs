@@ -51,6 +51,18 @@ impl Response {
         }
     }
 
+    /// The least number of which rounding, with a standard deviation of 1 / sqrt(12) of a step, hides no more than one part in `certain`.
+    pub(crate) fn least(&self, c: usize, certain: f32) -> f32 {
+        match self {
+            Response::Linear => 0.0,
+            Response::Table { levels, .. } => {
+                let is_clear =
+                    |pair: &&[f32]| pair[0] > 0.0 && 12f32.sqrt() * pair[0] >= certain * (pair[1] - pair[0]);
+                levels[c].windows(2).find(is_clear).map_or(levels[c][LEVELS - 1], |pair| pair[0])
+            }
+        }
+    }
+
     /// Recovers the response from small copies of photographs with these relative exposures.
     pub(crate) fn recover(probes: &[Probe], exposures: &[f64], white: f32) -> Result<Response, MeasureError> {
         if probes.len() < 3 {

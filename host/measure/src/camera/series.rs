@@ -90,6 +90,11 @@ pub(crate) fn exposures(shots: &[Shot]) -> Vec<f64> {
 /// What exposures a second try needs under lamp `lamp`: `clipped` are the stacks whose highlight even the shortest does not show.
 pub(crate) fn advice(shots: &[Shot], lamp: usize, clipped: &[&str]) -> Vec<String> {
     let mut again = Vec::new();
+    if shots.iter().any(|shot| shot.recovered) {
+        again.push(format!(
+            "lamp {lamp}: tones that a camera's curve has bent (JPEG) are recovered to some per cent only: develop RAW to linear 16-bit TIFF"
+        ));
+    }
     if !clipped.is_empty() {
         let shortest = shots.last().map_or(0.0, |shot| shot.seconds);
         again.push(format!(

@@ -178,6 +178,16 @@ fn a_tidy_studio_gives_no_doubts() {
     }
 }
 
+/// JPEG of a camera without a tone curve of its own is measured, not refused.
+#[test]
+fn plain_jpeg_is_measured() {
+    for material in testing::drawn(&MATERIALS, 1) {
+        let outcome = Outcome::of(&Studio { written: Written::Jpeg(0.0), ..Studio::default() }, material);
+        outcome.print(material, "JPEG", &["JPEG"]);
+        assert!(!outcome.refused && outcome.is_honest(&["JPEG"]), "{}: {outcome:?}", material.name);
+    }
+}
+
 /// The cells that each change waits for; the others are tried in full.
 const GATE: [(&str, &str); 14] = [
     ("paper", "eight exposures, still"),
