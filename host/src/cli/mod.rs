@@ -13,6 +13,7 @@ mod printing;
 
 use std::ffi::OsString;
 use std::io::Write as _;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Result;
@@ -110,6 +111,15 @@ fn parsed(program: &mut clap::Command, args: Vec<OsString>) -> Result<Args, clap
 
 /// Says what is wrong with the arguments, or shows the help that was asked for.
 fn not_parsed(error: &clap::Error) -> ExitCode {
+    // So it looks where a file was dropped on the program.
+    let first = std::env::args_os().nth(1).map(PathBuf::from);
+    if let Some(file) = first.filter(|file| error.kind() == ErrorKind::InvalidSubcommand && file.exists()) {
+        return failed(&console::usage(format!(
+            "{}: expected a command before a file or folder: `foilpress layers FILE` prints spot-colour artwork, `foilpress print FILE` a \
+             document of materials, `foilpress plan FILE` shows what a print needs; `foilpress --help` shows the rest",
+            file.display()
+        )));
+    }
     let acts = |argument: OsString| {
         let text = argument.to_string_lossy().into_owned();
         visible_line(&text) != text

@@ -61,6 +61,19 @@ fn with_map(remove: &str, name: &str, bytes: &[u8]) -> String {
 }
 
 #[test]
+fn a_file_without_a_command_is_told_the_commands_for_files() {
+    let bench = Bench::new();
+    fs::write(bench.path("red fish.svg"), "").unwrap();
+    let said = bench.command_of(["red fish.svg"]).output().unwrap();
+    let text = text(&said.stderr);
+    assert_eq!(said.status.code(), Some(2), "{text}");
+    for words in ["red fish.svg", "expected a command", "foilpress layers FILE", "foilpress print FILE"] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    assert!(bench.refused(2, "layerz").contains("layers"));
+}
+
+#[test]
 fn pictures_that_claim_to_be_huge_are_refused_before_they_are_decoded() {
     for (width, height) in [(40_000, 40_000), (16_384, 16_384), (1, 16_385)] {
         let said = with_map("base_color.png", "base_color.png", &boast(width, height));

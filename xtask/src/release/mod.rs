@@ -168,7 +168,7 @@ pub fn run(root: &Path, only: &[String], dry: bool) -> Result<()> {
 }
 
 /// What this machine cannot try.
-const NOT_TRIED: &str = "\nNot tried: WinUSB and COM ports of a real bridge on Windows, macOS, a real board, a real printer. The packages for \
+const NOT_TRIED: &str = "\nNot tried: WinUSB and the COM port of a real bridge on Windows, macOS, a real board, a real printer. The packages for \
     arm64 and armhf were unpacked, not installed.\n\nThe bridge has the USB number 1209:0001, which is for tests: boards must not be passed on with \
     it (packaging/usb-id.md).\n";
 
@@ -191,7 +191,7 @@ impl System {
         }
         let runner = self.runner.map(|(runner, package)| (runner[0], package));
         let packers: &[(&str, &str)] = match self.form {
-            Form::Zip => &[("zip", "zip"), ("unzip", "unzip")],
+            Form::Zip => &[("zip", "zip"), ("unzip", "unzip"), ("socat", "socat")],
             Form::Deb(_) | Form::Tar => &[],
         };
         for (program, package) in self.linker.into_iter().chain(runner).chain(packers.iter().copied()) {

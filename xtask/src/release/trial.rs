@@ -3,13 +3,16 @@
 //! Problem: a program that was built for another system has been run by nobody.
 //! Method: the archive is unpacked as its users do and the program in it started, by itself, under `qemu` or under `wine`: a sample is printed, flat
 //! art too, a plan is made, a job goes to a bridge on a socket, in a folder with a blank and a letter that is not ASCII in its name; one result has a
-//! path of more than 260 letters; where Ghostscript is not, a PDF has to say how it is had. What it has made comes back, to be compared.
+//! path of more than 260 letters; where Ghostscript is not, a PDF has to say how it is had. On Windows the job also goes through a COM port, and a
+//! file is dropped on the program. What it has made comes back, to be compared.
 //! Limits: no USB and no drivers, which an emulator of programs has not.
 
 use std::fs;
-use std::io::{BufRead as _, BufReader};
+use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail, ensure};
 
@@ -21,7 +24,10 @@ pub const HEAD: &str = "| system | program | archive | version, sample, layers, 
 
 /// A system's line in that table; sizes in bytes of program and archive.
 pub fn line(system: &System, [program, archive]: [u64; 2], same: bool) -> String {
-    let with = system.runner.map_or("by itself", |(runner, _)| runner[0]);
+    let with = match system.form {
+        Form::Zip => "wine; through a COM port and with a dropped file, too",
+        _ => system.runner.map_or("by itself", |(runner, _)| runner[0]),
+    };
     let alike = if same { "yes" } else { "other roundings, sizes within a hundredth" };
     let megabytes = |bytes| bytes as f64 / 1e6;
     format!(
@@ -53,6 +59,8 @@ pub fn run(system: &System, archive: &Path, folder: &Path, bridge: &Path) -> Res
         random_numbers_for_wine(&program, folder)?;
     }
     fs::create_dir_all(&work)?;
+    // Wine has a computer of its own, and no screen.
+    let wine = folder.with_file_name("wine");
     let start = |arguments: &[&str]| {
         let mut run = match system.runner {
             Some(([runner, options @ ..], _)) => {
@@ -62,8 +70,7 @@ pub fn run(system: &System, archive: &Path, folder: &Path, bridge: &Path) -> Res
             }
             _ => Command::new(&program),
         };
-        // Wine has a computer of its own, and no screen.
-        run.env("WINEDEBUG", "-all").env("WINEPREFIX", folder.with_file_name("wine")).env_remove("DISPLAY");
+        run.env("WINEDEBUG", "-all").env("WINEPREFIX", &wine).env_remove("DISPLAY");
         run.args(arguments).current_dir(&work).stdin(Stdio::null());
         run.output().with_context(|| format!("cannot start {run:?}"))
     };
@@ -91,6 +98,10 @@ pub fn run(system: &System, archive: &Path, folder: &Path, bridge: &Path) -> Res
         let said = start(&["layers", "page.pdf", "--to", "file:page.rgl"])?;
         let said = String::from_utf8_lossy(&said.stderr).into_owned();
         ensure!(said.contains("Ghostscript"), "without Ghostscript it said {said}");
+        send(bridge, &work.join("layers.rgl"), |to| {
+            through_com7(&wine, to, || run(&["send", "layers.rgl", "--to", "serial:COM7"]).map(drop))
+        })?;
+        dropped(&wine, &program, &work.join("art.svg"))?;
     }
     send(bridge, &work.join("layers.rgl"), |to| run(&["send", "layers.rgl", "--to", to]).map(drop))?;
     // Nobody listens there; the images are found and read before anything is asked.
@@ -141,6 +152,58 @@ fn send(bridge: &Path, job: &Path, send: impl FnOnce(&str) -> Result<()>) -> Res
     let right = serving.wait_with_output()?.status;
     sent?;
     ensure!(right.success(), "the bridge has not had the bytes of {}", job.display());
+    Ok(())
+}
+
+/// Does this while Wine's COM7, which is a link to a terminal, leads to a socket.
+fn through_com7(wine: &Path, to: &str, act: impl FnOnce() -> Result<()>) -> Result<()> {
+    let port = wine.join("dosdevices").join("com7");
+    let _ = fs::remove_file(&port);
+    let terminal = format!("PTY,link={},raw,echo=0", port.display());
+    let mut wire = command("socat", &[&terminal, &to.replacen("tcp", "TCP", 1)]).spawn()?;
+    for _ in 0..100 {
+        if port.exists() {
+            break;
+        }
+        sleep(Duration::from_millis(50));
+    }
+    let done = act();
+    // It has ended by itself if the bridge has hung up.
+    let _ = wire.kill();
+    wire.wait()?;
+    done
+}
+
+/// Drops a file on the program: what it says has to stay until Enter is pressed.
+fn dropped(wine: &Path, program: &Path, file: &Path) -> Result<()> {
+    let line = format!("wine '{}' '{}'", program.display(), file.display());
+    let mut window = command("script", &["-qec", &line, "/dev/null"])
+        .env("WINEDEBUG", "-all")
+        .env("WINEPREFIX", wine)
+        .env_remove("DISPLAY")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()?;
+    if let Some(mut keys) = window.stdin.take() {
+        keys.write_all(b"\n")?;
+    }
+    let drawn = window.wait_with_output()?.stdout;
+    // Wine draws letter by letter, with movements of the cursor between them and for blanks.
+    let drawn = String::from_utf8_lossy(&drawn);
+    let letters = |part: &str| part.chars().filter(char::is_ascii_alphabetic).collect::<String>();
+    let said: String = drawn
+        .split('\x1b')
+        .enumerate()
+        .map(|(i, part)| {
+            letters(if i == 0 {
+                part
+            } else {
+                part.trim_start_matches(|c: char| !c.is_alphabetic()).get(1..).unwrap_or("")
+            })
+        })
+        .collect();
+    let expected = ["foilpress layers FILE", "Press Enter to close this window"].map(letters);
+    ensure!(expected.iter().all(|words| said.contains(words)), "a dropped file was told {said}");
     Ok(())
 }
 

@@ -44,7 +44,7 @@ pub(crate) struct Tones {
     least: Vec<f32>,
     /// Light that noise does not hide.
     floor: f32,
-    /// The light of each channel, and what noise does not hide of it.
+    /// The light of each channel, not a number where one is full, and what noise does not hide of it.
     channels: Vec<[f32; 3]>,
     floors: [f32; 3],
 }
@@ -101,7 +101,12 @@ impl Tones {
         let channels = probe
             .mean
             .iter()
-            .map(|mean| std::array::from_fn(|c| response.linear(c, mean[c]) / time))
+            .zip(&probe.most)
+            .map(|(mean, most)| {
+                std::array::from_fn(
+                    |c| if full(most) { f32::NAN } else { response.linear(c, mean[c]) / time },
+                )
+            })
             .collect();
         Tones {
             width: probe.width,
@@ -177,28 +182,12 @@ impl Tones {
         }
     }
 
-    /// The light of each channel between pixels; `None` outside, and beside what is full.
-    fn between(&self, x: f64, y: f64) -> Option<[f32; 3]> {
-        let (u, v) = ((x - x.floor()) as f32, (y - y.floor()) as f32);
-        let mut sum = [0.0; 3];
-        for (i, j, part) in
-            [(0, 0, (1.0 - u) * (1.0 - v)), (1, 0, u * (1.0 - v)), (0, 1, (1.0 - u) * v), (1, 1, u * v)]
-        {
-            let (x, y) = (x.floor() as i64 + i, y.floor() as i64 + j);
-            // What does not count may be missing.
-            if part < 1e-6 {
-                continue;
-            }
-            if !(0..self.width as i64).contains(&x) || !(0..self.height as i64).contains(&y) {
-                return None;
-            }
-            let i = y as usize * self.width + x as usize;
-            if self.light[i].is_nan() {
-                return None;
-            }
-            sum.iter_mut().zip(self.channels[i]).for_each(|(sum, light)| *sum += part * light);
-        }
-        Some(sum)
+    /// The light of each channel between pixels; not a number outside, and beside what is full.
+    fn between(&self, x: f64, y: f64) -> [f64; 3] {
+        let at = |c: usize, x: i64, y: i64| {
+            inside(x, y, self.width, self.height).map_or(f64::NAN, |i| f64::from(self.channels[i][c]))
+        };
+        std::array::from_fn(|c| around(x, y).map(|(x, y, part)| part * at(c, x, y)).sum())
     }
 
     /// How red and blue over green differ in even places that noise does not hide; 0 where there are too few.
@@ -211,16 +200,18 @@ impl Tones {
                 let even = [(1, 0), (-1, 0), (0, 1), (0, -1)]
                     .iter()
                     .all(|(k, l)| (logs.at(x + k, y + l) - here).abs() < EVEN);
+                if !even {
+                    continue;
+                }
                 // The very place: from pixel to pixel an even place may still change by more than a white balance does.
                 let there = other.between(x as f64 + shift[0], y as f64 + shift[1]);
-                let (true, Some(there)) = (even, there) else { continue };
                 // The longer exposure's neighbours choose: a place's own noise would choose what is too bright in it.
                 let ln = |c: usize| {
                     let near = [i - 1, i + 1, i - self.width, i + self.width];
                     let level = near.iter().map(|&i| self.channels[i][c]).sum::<f32>() / 4.0;
-                    let (a, b) = (self.channels[i][c], there[c]);
+                    let (a, b) = (f64::from(self.channels[i][c]), there[c]);
                     let clear = (CLEAR as f32) * self.floors[c].max(other.floors[c]);
-                    (level > clear && a > 0.0 && b > 0.0).then(|| f64::from((b / a).ln()))
+                    (level > clear && a > 0.0 && b > 0.0).then(|| (b / a).ln())
                 };
                 found.iter_mut().enumerate().for_each(|(c, found)| found.extend(ln(c)));
             }
@@ -310,6 +301,22 @@ impl Tones {
     }
 }
 
+/// A pixel's number.
+fn inside(x: i64, y: i64, width: usize, height: usize) -> Option<usize> {
+    ((0..width as i64).contains(&x) && (0..height as i64).contains(&y))
+        .then(|| y as usize * width + x as usize)
+}
+
+/// The pixels around a place, each with its part in what is read there. One that has none may be missing.
+fn around(x: f64, y: f64) -> impl Iterator<Item = (i64, i64, f64)> {
+    let (left, top) = (x.floor(), y.floor());
+    let (u, v) = (x - left, y - top);
+    [(0, 0, (1.0 - u) * (1.0 - v)), (1, 0, u * (1.0 - v)), (0, 1, (1.0 - u) * v), (1, 1, u * v)]
+        .into_iter()
+        .filter(|(.., part)| *part > 1e-6)
+        .map(move |(i, j, part)| (left as i64 + i, top as i64 + j, part))
+}
+
 /// A small copy of logarithms.
 struct Logs {
     width: usize,
@@ -319,17 +326,11 @@ struct Logs {
 
 impl Logs {
     fn at(&self, x: i64, y: i64) -> f64 {
-        let inside = (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y);
-        if inside { f64::from(self.ln[y as usize * self.width + x as usize]) } else { f64::NAN }
+        inside(x, y, self.width, self.height).map_or(f64::NAN, |i| f64::from(self.ln[i]))
     }
 
     fn between(&self, x: f64, y: f64) -> f64 {
-        let (x0, y0) = (x.floor(), y.floor());
-        let (u, v) = (x - x0, y - y0);
-        let at = |i: i64, j: i64| self.at(x0 as i64 + i, y0 as i64 + j);
-        // On a whole pixel the next one does not count, and may be missing.
-        let row = |j: i64| if u < 1e-6 { at(0, j) } else { at(0, j) * (1.0 - u) + at(1, j) * u };
-        if v < 1e-6 { row(0) } else { row(0) * (1.0 - v) + row(1) * v }
+        around(x, y).map(|(x, y, part)| part * self.at(x, y)).sum()
     }
 
     /// Steps until the shift stands.
