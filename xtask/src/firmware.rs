@@ -2,8 +2,11 @@
 //!
 //! Where the toolchain has clippy, the images are compiled by it, for it makes the same code as the compiler and checks the sources
 //! on the way: checking them by themselves would compile everything below them a second time.
+//!
+//! A release's images are the same bytes wherever they are built. The bridge's library lies outside of the firmware's workspace, and what the
+//! compiler calls it depends on the whole path: so the sources are reached by a link that has one place everywhere.
 
-use crate::{cargo, command, elf};
+use crate::{cargo, cargo_home, command, elf, succeed};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
@@ -81,6 +84,9 @@ struct Budget {
 /// What the boot ROM keeps of the memory.
 const ROM: usize = 8 << 10;
 
+/// For what the folders' own settings have flags.
+const BARE: &str = r#"cfg(all(target_arch = "arm", target_os = "none"))"#;
+
 /// The compiler with clippy's lints.
 const CLIPPY: &str = "clippy-driver";
 
@@ -89,19 +95,38 @@ const MEMORY: u32 = 0x2000_0000;
 /// Builds the bridge's images and writes them as UF2; gives the path of the Pico's.
 pub fn build(root: &Path) -> Result<PathBuf> {
     let [pico, pico2] = &BOARDS;
-    build_for(pico2, root)?;
-    build_for(pico, root)
+    build_for(pico2, root, None)?;
+    build_for(pico, root, None)
+}
+
+/// The link to the sources of a release.
+const LINK: &str = "/tmp/foilpress-release";
+
+/// Builds the bridge's images of a release.
+pub fn build_for_release(root: &Path) -> Result<()> {
+    succeed(command("ln", &["-sfn"]).arg(root).arg(LINK))?;
+    let built = BOARDS.iter().try_for_each(|board| build_for(board, root, Some(Path::new(LINK))).map(drop));
+    fs::remove_file(LINK)?;
+    built
 }
 
 /// Builds the rig's image and writes it as UF2; gives its path.
 pub fn build_rig(root: &Path) -> Result<PathBuf> {
-    build_for(&RIG, root)
+    build_for(&RIG, root, None)
 }
 
-fn build_for(board: &Board, root: &Path) -> Result<PathBuf> {
+fn build_for(board: &Board, root: &Path, link: Option<&Path>) -> Result<PathBuf> {
     let folder = root.join(board.folder);
     let target = target(root);
     let mut build = cargo(&["build", "--release", "--locked"]);
+    if let Some(link) = link {
+        build.arg("--manifest-path").arg(link.join(board.folder).join("Cargo.toml"));
+        // Beside those of the folder's own settings.
+        let flags: Vec<String> = [(root, "foilpress"), (&target, "target"), (&cargo_home(), "cargo")]
+            .map(|(from, to)| format!("'--remap-path-prefix={}={to}'", from.display()))
+            .into();
+        build.arg("--config").arg(format!("target.'{BARE}'.rustflags = [{}]", flags.join(", ")));
+    }
     // The folder's own settings name the linker's script and what is logged.
     build.args(board.arguments()).current_dir(&folder).env("CARGO_TARGET_DIR", &target);
     if has_clippy() {

@@ -16,7 +16,7 @@ mod release;
 mod runner;
 mod tools;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 use anyhow::{Context as _, ensure};
@@ -102,6 +102,12 @@ fn cargo(args: &[&str]) -> Command {
     command(&std::env::var("CARGO").unwrap_or_else(|_| "cargo".into()), args)
 }
 
+/// Where cargo keeps the sources of libraries.
+fn cargo_home() -> PathBuf {
+    let own = std::env::var_os("CARGO_HOME").map(PathBuf::from);
+    own.or_else(|| Some(PathBuf::from(std::env::var_os("HOME")?).join(".cargo"))).unwrap_or_default()
+}
+
 fn succeed(command: &mut Command) -> anyhow::Result<()> {
     let status = command.status().with_context(|| format!("cannot start {command:?}"))?;
     ensure!(status.success(), "{command:?}: {status}");
@@ -115,7 +121,7 @@ fn command(program: &str, args: &[&str]) -> Command {
 }
 
 /// The files in this folder and below.
-fn all_files(folder: &Path, files: &mut Vec<std::path::PathBuf>) -> anyhow::Result<()> {
+fn all_files(folder: &Path, files: &mut Vec<PathBuf>) -> anyhow::Result<()> {
     for item in std::fs::read_dir(folder)? {
         let path = item?.path();
         if path.is_dir() { all_files(&path, files)? } else { files.push(path) }

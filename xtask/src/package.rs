@@ -183,6 +183,9 @@ fn check(package: &Path, tree: &Path) -> Result<()> {
         ("usr/share/bash-completion/completions/foilpress", 0o644),
         ("usr/share/foilpress/firmware/foilpress-bridge.elf", 0o644),
         ("usr/share/foilpress/firmware/foilpress-bridge-pico2.elf", 0o644),
+        ("usr/share/doc/foilpress/README.md", 0o644),
+        ("usr/share/doc/foilpress/docs/wiring.md", 0o644),
+        ("usr/share/doc/foilpress/docs/guide/decal/white.png", 0o644),
     ] {
         let found = root.join(path);
         let installed = fs::read(&found).with_context(|| format!("{path} is not in the package"))?;

@@ -18,7 +18,7 @@ use std::{env, fs};
 use anyhow::{Context as _, Result, ensure};
 
 use crate::package::{self, Profile};
-use crate::{all_files, cargo, command, firmware, succeed};
+use crate::{all_files, cargo, cargo_home, command, firmware, succeed};
 
 mod trial;
 
@@ -125,7 +125,7 @@ pub fn run(root: &Path, only: &[String], dry: bool) -> Result<()> {
     let release = Release::of(root)?;
     let _ = fs::remove_dir_all(&release.dist);
     fs::create_dir_all(&release.dist)?;
-    firmware::build(root)?;
+    firmware::build_for_release(root)?;
     let mut tried = String::from(trial::HEAD);
     let bridge = release.build(&SYSTEMS[0], &["--package", "foilpress-tests", "--bin", "served-bridge"])?;
     let bridge = bridge.join("served-bridge");
@@ -241,11 +241,8 @@ impl Release<'_> {
     fn build(&self, system: &System, what: &[&str]) -> Result<PathBuf> {
         let mut build = cargo(&["build", "--release", "--locked", "--target", system.triple]);
         build.args(what);
-        let home = env::var_os("CARGO_HOME").map(PathBuf::from);
-        let home =
-            home.or_else(|| Some(PathBuf::from(env::var_os("HOME")?).join(".cargo"))).unwrap_or_default();
         let mut flags = OsString::new();
-        for (from, to) in [(self.root, "foilpress"), (home.as_path(), "cargo")] {
+        for (from, to) in [(self.root, "foilpress"), (&cargo_home(), "cargo")] {
             flags.push(format!("--remap-path-prefix={}={to} ", from.display()));
         }
         if system.form != Form::Zip {
@@ -345,11 +342,16 @@ impl Release<'_> {
         for image in firmware::INSTALLED {
             fs::copy(firmware::target(self.root).join(image), images.join(image))?;
         }
-        for file in ["LICENSE-MIT", "LICENSE-APACHE", "CHANGELOG.md", "docs/install.md"] {
-            let path = self.root.join(file);
-            let name = path.file_name().context("a name")?;
-            fs::copy(&path, folder.join(name))
-                .with_context(|| format!("{} cannot be copied", path.display()))?;
+        let mut files =
+            ["LICENSE-MIT", "LICENSE-APACHE", "CHANGELOG.md", "README.md"].map(PathBuf::from).to_vec();
+        let mut pages = Vec::new();
+        all_files(&self.root.join("docs"), &mut pages)?;
+        files.extend(pages.iter().filter_map(|page| page.strip_prefix(self.root).ok()).map(PathBuf::from));
+        for file in files {
+            let place = folder.join(&file);
+            fs::create_dir_all(place.parent().unwrap_or(&folder))?;
+            fs::copy(self.root.join(&file), place)
+                .with_context(|| format!("{} cannot be copied", file.display()))?;
         }
         match system.form {
             Form::Zip => {
