@@ -1,7 +1,7 @@
 //! OpenEXR files, which name their channels freely.
 //!
 //! Method: the channels are `R`, `G`, `B` or `Y`, alone or behind the name of a layer (`ViewLayer.Combined.R`), or a single channel
-//! of any name. Channels without a layer come first; several layers with colours are an error. The primaries of the colours are
+//! of any name, with `A` of the same layer as alpha. Channels without a layer come first; several layers with colours are an error. The primaries of the colours are
 //! returned as the header states them. Limits: no subsampled channels, no whole numbers (they identify objects and
 //! are no values); the first part.
 
@@ -94,7 +94,9 @@ fn choose(list: &[AnyChannel<FlatSamples>]) -> Result<Vec<&AnyChannel<FlatSample
     let parts: Vec<(String, String)> = names.iter().map(|name| split(name)).collect();
     for kind in [&["R", "G", "B"][..], &["Y"]] {
         let within = |layer: &str| -> Option<Vec<usize>> {
-            kind.iter().map(|&kind| parts.iter().position(|(l, name)| l == layer && name == kind)).collect()
+            let at = |kind: &str| parts.iter().position(|(l, name)| l == layer && name == kind);
+            let colours: Option<Vec<usize>> = kind.iter().map(|kind| at(kind)).collect();
+            Some(colours?.into_iter().chain(at("A")).collect())
         };
         let mut layers: Vec<&str> = parts.iter().map(|(layer, _)| layer.as_str()).collect();
         layers.sort_unstable();
@@ -170,6 +172,15 @@ mod tests {
         assert!(error.contains("ViewLayer.Combined, ViewLayer.DiffCol"), "{error}");
         let error = all(&[depth, vec![("V".into(), floats(0.0, 0.0))]]).err().unwrap();
         assert!(error.contains("V, ViewLayer.Depth.Z") || error.contains("ViewLayer.Depth.Z, V"), "{error}");
+    }
+
+    #[test]
+    fn alpha_of_the_same_layer_comes_last() {
+        let plain = [("A", floats(0.4, 0.4)), ("Y", floats(1.0, 2.0))];
+        let found = exr(&written(&plain, None)).unwrap();
+        assert_eq!((found.channels, &found.values[..]), (2, &[1.0, 0.4, 2.0, 0.4][..]));
+        let elsewhere = [("mask.A", floats(0.4, 0.4)), ("Y", floats(1.0, 2.0))];
+        assert_eq!(exr(&written(&elsewhere, None)).unwrap().channels, 1);
     }
 
     #[test]

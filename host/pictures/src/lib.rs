@@ -9,6 +9,7 @@
 mod chunks;
 mod exr;
 mod floats;
+mod jpeg;
 pub mod resolution;
 
 use std::io::Cursor;
@@ -91,6 +92,10 @@ impl Opened<'_> {
 pub fn open(bytes: &[u8], format: ImageFormat, bounds: Bounds) -> ImageResult<Opened<'_>> {
     if format == ImageFormat::Png && !chunks::has_plain_profile(bytes) {
         let problem = format!("its colour profile expands to more than {} MB", MOST_PROFILE >> 20);
+        return Err(ImageError::Decoding(DecodingError::new(format.into(), problem)));
+    }
+    if format == ImageFormat::Jpeg && jpeg::is_cut_short(bytes) {
+        let problem = "the file ends before the picture does: it was cut short; copy or save it again";
         return Err(ImageError::Decoding(DecodingError::new(format.into(), problem)));
     }
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);

@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use sheet::Sheet;
-use testing::program::{Bench, entries, small_document};
+use testing::program::{Bench, entries, small_document, text};
 
 #[test]
 fn a_folder_becomes_a_print_with_everything_in_it() {
@@ -79,6 +79,43 @@ fn every_arrow_by_itself_gives_the_job_of_print() {
     let summary = bench.done("inspect steps.rgl --json --passes seen");
     let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
     assert_eq!(summary["passes"].as_array().map(Vec::len), Some(entries(&bench.path("seen")).len()));
+}
+
+#[test]
+fn only_what_was_factored_and_not_changed_since_is_mapped_with_its_document() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    small_document(&bench.path("other"));
+    fs::copy(bench.path("other/metallic.png"), bench.path("other/roughness.png")).unwrap();
+    bench.done("factor tile --bases 3 -o tile.foil");
+    bench.done("map tile.foil --document tile --inks process -o with.mix");
+    let said = bench.refused(1, "map tile.foil --document other --inks process -o other.mix");
+    assert!(said.contains("factored from another document") && said.contains("--document"), "{said}");
+    bench.done("edit tile.foil --tint #20ff20 -o edited.foil");
+    let said = bench.refused(1, "map edited.foil --document tile --inks process -o edited.mix");
+    assert!(said.contains("it was edited"), "{said}");
+    // Weights that are painted over: two bases change places.
+    let [a, b, c] =
+        ["weights-00.png", "weights-01.png", "swapped.png"].map(|map| bench.path("tile.foil").join(map));
+    for (from, to) in [(&a, &c), (&b, &a), (&c, &b)] {
+        fs::rename(from, to).unwrap();
+    }
+    let said = bench.refused(1, "map tile.foil --document tile --inks process -o painted.mix");
+    assert!(said.contains("changed since it was factored"), "{said}");
+    bench.done("map tile.foil --inks process -o painted.mix");
+}
+
+#[test]
+fn choices_that_a_document_has_no_use_for_are_named() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    bench.done("factor tile --bases 3 -o tile.foil");
+    let said = |args: &str| text(&bench.run(args).stderr);
+    let again = said("factor tile.foil --bases 2 --material 7 --colour-space linear -o again.foil");
+    for words in ["keeps its bases", "choice of material `7` has no effect", "colour space has no effect"] {
+        assert!(again.contains(words), "{words}: {again}");
+    }
+    assert!(!said("factor tile.foil -o plain.foil").contains("no effect"));
 }
 
 #[test]

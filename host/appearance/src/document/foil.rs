@@ -52,6 +52,18 @@ struct Index {
     bases: String,
     /// One file per basis, in order.
     maps: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    origin: Option<Origin>,
+}
+
+/// What a factored document was made of, as long as nobody has changed it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Origin {
+    /// The [digest](Document::digest) of the document that was factored.
+    pub document: String,
+    /// The [fingerprint](crate::edit::fingerprint) of its bases and weights.
+    pub result: String,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -69,11 +81,12 @@ fn io(path: &Path, attempt: &'static str) -> impl FnOnce(std::io::Error) -> Docu
 }
 
 /// Writes a factored document as the folder `path`, which must not exist yet. Only half-angle tabulations can be written,
-/// because the file contains curves.
+/// because the file contains curves. `origin` says what was factored, unless it was edited since.
 pub fn write(
     factored: &Factored,
     name: &str,
     size_mm: Option<(f64, f64)>,
+    origin: Option<Origin>,
     path: &Path,
 ) -> Result<(), DocumentError> {
     let angles = factored.space.angles();
@@ -139,6 +152,7 @@ pub fn write(
         samples: angles.len(),
         bases: BASES.into(),
         maps,
+        origin,
     };
     let at = inside.join(INDEX);
     let text = toml::to_string(&index).map_err(|error| io(&at, "write")(std::io::Error::other(error)))?;
@@ -152,12 +166,26 @@ pub fn read(path: &Path, observer: &dyn Observer) -> Result<Document, DocumentEr
     open(path, Source::new(observer))
 }
 
-pub(super) fn open(path: &Path, mut source: Source<'_>) -> Result<Document, DocumentError> {
+/// What the factored document in the folder `path` was made of, if it says so.
+///
+/// # Errors
+/// A file that cannot be read, or a wrong value in it.
+pub fn origin(path: &Path, observer: &dyn Observer) -> Result<Option<Origin>, DocumentError> {
+    Ok(index(path, &mut Source::new(observer))?.origin)
+}
+
+fn index(path: &Path, source: &mut Source<'_>) -> Result<Index, DocumentError> {
     let at = path.join(INDEX);
-    let wrong = |problem: String| DocumentError::Settings { path: at.clone(), problem };
     let text = source.read_text(&at)?;
-    let index: Index = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
-    check(&index).map_err(&wrong)?;
+    let wrong = |problem: String| DocumentError::Settings { path: at, problem };
+    match toml::from_str(&text) {
+        Ok(index) => check(&index).map(|()| index).map_err(wrong),
+        Err(error) => Err(wrong(error.to_string())),
+    }
+}
+
+pub(super) fn open(path: &Path, mut source: Source<'_>) -> Result<Document, DocumentError> {
+    let index = index(path, &mut source)?;
     let space = Space::half_angle(index.samples);
     let bases = read_bases(&path.join(&index.bases), &index, &space, &mut source)?;
 
@@ -318,7 +346,9 @@ mod tests {
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("a.foil");
             let original = factored(width, height, bases, seed);
-            write(&original, "a thing", Some((12.5, 30.0)), &path).unwrap();
+            let origin = Origin { document: "ab".into(), result: "cd".into() };
+            write(&original, "a thing", Some((12.5, 30.0)), Some(origin.clone()), &path).unwrap();
+            prop_assert_eq!(super::origin(&path, &Silent).unwrap(), Some(origin));
             let document = read(&path, &Silent).unwrap();
             prop_assert_eq!(document.name.as_str(), "a thing");
             prop_assert_eq!(document.size_mm, Some((12.5, 30.0)));
@@ -332,7 +362,7 @@ mod tests {
     fn weights_that_do_not_sum_to_one_are_refused_with_their_place() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.foil");
-        write(&factored(3, 2, 2, 5), "a", None, &path).unwrap();
+        write(&factored(3, 2, 2, 5), "a", None, None, &path).unwrap();
         std::fs::copy(path.join("weights-00.png"), path.join("weights-01.png")).unwrap();
         let error = observe::with_causes(&read(&path, &Silent).unwrap_err());
         assert!(error.contains("a.foil") && error.contains("pixel (0, 0)"), "{error}");
@@ -342,7 +372,7 @@ mod tests {
     fn unknown_keys_and_foreign_paths_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.foil");
-        write(&factored(2, 2, 1, 5), "a", None, &path).unwrap();
+        write(&factored(2, 2, 1, 5), "a", None, None, &path).unwrap();
         let text = std::fs::read_to_string(path.join(INDEX)).unwrap();
         for (from, to, says) in [
             ("samples", "sampels", "sampels"),
@@ -361,7 +391,7 @@ mod tests {
     #[test]
     fn an_existing_folder_is_not_overwritten() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(write(&factored(2, 2, 1, 5), "a", None, folder.path()).is_err());
+        assert!(write(&factored(2, 2, 1, 5), "a", None, None, folder.path()).is_err());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 }

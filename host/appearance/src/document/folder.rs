@@ -14,7 +14,7 @@ use std::path::Path;
 use super::content::{Content, Document, Options, name_of};
 use super::error::DocumentError;
 use super::layers::CoatLayer;
-use super::names::Role;
+use super::names::{self, Role};
 use super::picture::{Encoding, Picture};
 use super::relief;
 use super::source::{MOST_BYTES, Source};
@@ -101,19 +101,15 @@ impl Reader<'_, '_> {
     fn single(&mut self, role: Role) -> Result<Option<Field>, DocumentError> {
         let Some(name) = self.files.one(role)? else { return Ok(None) };
         let picture = self.picture(&name)?;
-        if picture.colours() == 3 {
-            let (red, green) = (picture.channel(0), picture.channel(1));
-            let apart = red.values().zip(green.values()).any(|(a, b)| (a - b).abs() > 0.02);
-            if apart {
-                return Err(DocumentError::Picture {
-                    path: self.files.folder.join(&name),
-                    problem: format!(
-                        "expected one {} value per pixel, found colours; if this is a packed map, name it \
-                         occlusion_roughness_metallic",
-                        role.name()
-                    ),
-                });
-            }
+        if !picture.is_grey() {
+            return Err(DocumentError::Picture {
+                path: self.files.folder.join(&name),
+                problem: format!(
+                    "expected one {} value per pixel, found colours; if this is a packed map, name it \
+                     occlusion_roughness_metallic",
+                    role.name()
+                ),
+            });
         }
         self.data(&name, &picture, 0).map(Some)
     }
@@ -279,17 +275,25 @@ fn roughness_metallic(
             reader.source.note(format!("{name}: not read, because its channels exist as separate maps"));
         } else {
             let picture = reader.picture(&name)?;
-            if picture.colours() != 3 {
+            // Where the name of the material ends in metal, its roughness has the name of a packed map.
+            if picture.is_grey() && roughness.is_none() && names::alone(&name) == Some(Role::Roughness) {
+                reader
+                    .source
+                    .note(format!("{name}: read as roughness alone, because its channels are equal"));
+                roughness = Some(reader.data(&name, &picture, 0)?);
+            } else if picture.colours() != 3 {
                 return Err(DocumentError::Picture {
                     path: reader.files.folder.join(&name),
                     problem: "expected three channels (occlusion, roughness, metallic), found grey".into(),
                 });
-            }
-            if roughness.is_none() {
-                roughness = Some(reader.data(&name, &picture, 1)?);
-            }
-            if metal.is_none() {
-                metal = Some(reader.data(&name, &picture, 2)?);
+            } else {
+                reader.source.note(format!("{name}: roughness is read from green, metallic from blue"));
+                if roughness.is_none() {
+                    roughness = Some(reader.data(&name, &picture, 1)?);
+                }
+                if metal.is_none() {
+                    metal = Some(reader.data(&name, &picture, 2)?);
+                }
             }
         }
     }

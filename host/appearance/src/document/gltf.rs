@@ -12,17 +12,21 @@ mod loader;
 use std::path::Path;
 
 use ::gltf::json;
+use ::gltf::json::extensions::texture::TextureTransform;
+use ::gltf::json::material::AlphaMode;
+use ::gltf::json::validation::Checked;
 
 use super::content::{ColourSpace, Content, Document, Options, SWATCH_MM, name_of};
 use super::error::DocumentError;
 use super::layers::{CoatLayer, Layers, PbrWorkflow, build};
+use super::picture::Picture;
 use super::relief;
 use super::source::{MOST_BYTES, Source};
 use super::texture::Field;
 use crate::brdf::Space;
 use crate::materials::dielectric;
 
-use loader::{Loaded, Loader, coloured};
+use loader::{Loaded, Loader, Placement, coloured};
 
 /// Extensions that are supported, or that do not affect reflectance.
 const READ: [&str; 6] = [
@@ -36,6 +40,7 @@ const READ: [&str; 6] = [
 
 const CLEARCOAT: &str = "KHR_materials_clearcoat";
 const UNLIT: &str = "KHR_materials_unlit";
+const TRANSFORM: &str = "KHR_texture_transform";
 
 pub(super) fn open(
     path: &Path,
@@ -64,9 +69,22 @@ pub(super) fn open(
     if !foreign.is_empty() {
         source.note(format!("{}: the file uses {}, which is ignored", path.display(), foreign.join(", ")));
     }
+    let emits = material.emissive_texture.is_some() || material.emissive_factor.0 != [0.0; 3];
+    let is_transparent = material.alpha_mode != Checked::Valid(AlphaMode::Opaque);
+    let unprinted: Vec<&str> = [(emits, "emission"), (is_transparent, "transparency (alphaMode)")]
+        .into_iter()
+        .filter_map(|(is_there, what)| is_there.then_some(what))
+        .collect();
+    if !unprinted.is_empty() {
+        source.note(format!(
+            "{}: not printed: {}; they describe what ink on paper cannot show",
+            path.display(),
+            unprinted.join(", ")
+        ));
+    }
     let coloured = |primitive: &json::mesh::Primitive| {
-        let colour = |semantic: &json::validation::Checked<json::mesh::Semantic>| {
-            matches!(semantic, json::validation::Checked::Valid(json::mesh::Semantic::Colors(_)))
+        let colour = |semantic: &Checked<json::mesh::Semantic>| {
+            matches!(semantic, Checked::Valid(json::mesh::Semantic::Colors(_)))
         };
         primitive.material.is_some_and(|of| of.value() == number) && primitive.attributes.keys().any(colour)
     };
@@ -179,7 +197,8 @@ fn layers(
             let base = loader.colour(old.diffuse_texture.as_ref(), [r, g, b], space, "diffuseTexture")?;
             let (f0, gloss) = match &old.specular_glossiness_texture {
                 Some(info) => {
-                    let Loaded { name, picture } = loader.load(info, "specularGlossinessTexture")?;
+                    let Loaded { name, picture } =
+                        loader.load(info, "specularGlossinessTexture", Picture::decode_with_alpha)?;
                     loader.source.note(format!("{name}: alpha is read as glossiness"));
                     let gloss = Field::Map(picture.channel(3)).times(old.glossiness_factor.0);
                     (coloured(&picture, old.specular_factor.0, space), gloss)
@@ -201,7 +220,8 @@ fn layers(
             let (rough, metal) = (pbr.roughness_factor.0, pbr.metallic_factor.0);
             let (roughness, metal) = match &pbr.metallic_roughness_texture {
                 Some(info) => {
-                    let Loaded { name, picture } = loader.load(info, "metallicRoughnessTexture")?;
+                    let Loaded { name, picture } =
+                        loader.load(info, "metallicRoughnessTexture", Picture::decode)?;
                     if picture.colours() != 3 {
                         let problem =
                             format!("{name}: expected roughness in green and metallic in blue, found grey");
@@ -225,7 +245,11 @@ fn layers(
                     )?;
                     let level = match &s.specular_texture {
                         Some(info) => {
-                            let picture = loader.load(info, "specularTexture")?.picture;
+                            let Loaded { name, picture } =
+                                loader.load(info, "specularTexture", Picture::decode_with_alpha)?;
+                            loader
+                                .source
+                                .note(format!("{name}: alpha is read as the strength of reflection"));
                             Field::Map(picture.channel(3)).times(s.specular_factor.0)
                         }
                         None => Field::Constant(s.specular_factor.0),
@@ -298,7 +322,7 @@ fn clearcoat(
     }
     let mut field = |info: &Option<json::texture::Info>, factor, channel, name| match info {
         Some(info) => Ok::<_, DocumentError>(
-            Field::Map(loader.load(info, name)?.picture.channel(channel)).times(factor),
+            Field::Map(loader.load(info, name, Picture::decode)?.picture.channel(channel)).times(factor),
         ),
         None => Ok(Field::Constant(factor)),
     };
@@ -319,20 +343,27 @@ fn note_clamped(loader: &mut Loader<'_, '_>, name: &str, factors: &[f32]) {
     }
 }
 
-/// The slope variance of the normal map, or nothing if it has its own coordinates, as detail that repeats at another
+/// The slope variance of the normal map, or nothing if it lies otherwise on the surface, as detail that repeats at another
 /// scale does.
 fn normal_variance(
     loader: &mut Loader<'_, '_>,
     normal: &json::material::NormalTexture,
     base: Option<(usize, usize)>,
 ) -> Result<Option<Field>, DocumentError> {
-    if loader.placement.is_some_and(|first| first.coordinates != normal.tex_coord) {
+    let transform = normal.extensions.as_ref().and_then(|e| e.others.get(TRANSFORM)).cloned();
+    let transform: Option<TextureTransform> = transform
+        .map(serde_json::from_value)
+        .transpose()
+        .map_err(|error| loader.wrong("normalTexture", format!("{TRANSFORM}: {error}")))?;
+    let placement = Placement::new(normal.tex_coord, transform.as_ref());
+    if loader.placement.is_some_and(|first| first != placement) {
         loader.source.note(
-            "normalTexture: ignored, because its coordinates differ from those of the other maps".into(),
+            "normalTexture: ignored, because its placement on the surface differs from that of the other maps"
+                .into(),
         );
         return Ok(None);
     }
-    let Loaded { name, picture } = loader.texture(normal.index.value(), "normalTexture")?;
+    let Loaded { name, picture } = loader.texture(normal.index.value(), "normalTexture", Picture::decode)?;
     if picture.colours() != 3 {
         return Err(loader
             .wrong("normalTexture", format!("{name}: expected normals with three components, found grey")));

@@ -72,7 +72,8 @@ fn factored(damaged: &'static str) -> Victim {
     let maps = WeightMaps::new(4, 3, 2, data).unwrap();
     let scratch = tempfile::tempdir().unwrap();
     let path = scratch.path().join("a.foil");
-    foil::write(&crate::materials::Factored { space, bases, maps }, "a", Some((30.0, 20.0)), &path).unwrap();
+    foil::write(&crate::materials::Factored { space, bases, maps }, "a", Some((30.0, 20.0)), None, &path)
+        .unwrap();
     let names = ["document.toml", "bases.csv", "weights-00.png", "weights-01.png"];
     let files = names.map(|name| (name, std::fs::read(path.join(name)).unwrap())).to_vec();
     Victim { files, opened: None, damaged }

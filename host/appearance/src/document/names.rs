@@ -2,8 +2,8 @@
 //!
 //! Problem: `Metal053C_1K-JPG_NormalGL.jpg`, `rusty_metal_02_arm_2k.png`, `T_Rock_BC.tga`, `albedo.jpg`.
 //! Method: the stem is split into lower-case words at punctuation and where a capital follows a lower-case letter. Words
-//! that all files of the folder begin with are the name of the material and are skipped (so `rusty_metal_diff` is not a
-//! metallic map). Words about size and format are dropped. The longest run of the remaining words that names a role,
+//! that most files of the folder begin with are the name of the material and are skipped (so `rusty_metal_diff` is not a
+//! metallic map, whatever else lies in the folder). Words about size and format are dropped. The longest run of the remaining words that names a role,
 //! furthest to the right, decides. Single letters count only as the last word, as in Unreal's suffixes.
 //! Limits: a file whose name follows no convention is not used; `material.toml` can name the files instead.
 
@@ -59,7 +59,7 @@ impl Role {
 }
 
 /// Words, joined, that name a role.
-const ALIASES: [(&str, Role); 88] = [
+const ALIASES: [(&str, Role); 90] = [
     ("basecolor", Role::BaseColor),
     ("basecolour", Role::BaseColor),
     ("base", Role::BaseColor),
@@ -81,6 +81,8 @@ const ALIASES: [(&str, Role); 88] = [
     ("metalness", Role::Metallic),
     ("metallness", Role::Metallic),
     ("metal", Role::Metallic),
+    ("metallicity", Role::Metallic),
+    ("met", Role::Metallic),
     ("mtl", Role::Metallic),
     ("orm", Role::Packed),
     ("arm", Role::Packed),
@@ -141,8 +143,8 @@ const ALIASES: [(&str, Role); 88] = [
     ("displace", Role::Ignored),
     ("disp", Role::Ignored),
     ("bump", Role::Ignored),
-    ("opacity", Role::Ignored),
-    ("alpha", Role::Ignored),
+    ("opacity", Role::Unprintable),
+    ("alpha", Role::Unprintable),
     ("mask", Role::Ignored),
     ("curvature", Role::Ignored),
     ("preview", Role::Ignored),
@@ -245,17 +247,38 @@ fn role(words: &[String]) -> Option<Role> {
     None
 }
 
+/// A file's name without its ending.
+pub fn stem(name: &str) -> &str {
+    name.rsplit_once('.').map_or(name, |(stem, _)| stem)
+}
+
+/// The role that the last word of a file's name tells by itself.
+pub fn alone(name: &str) -> Option<Role> {
+    let words = words(stem(name));
+    let last = words.iter().rfind(|word| !is_noise(word))?;
+    role(std::slice::from_ref(last))
+}
+
+/// The words that more than half of the files begin with, as many as leave one of them its role.
+fn beginning(all: &[Vec<String>]) -> &[String] {
+    let is_shared = |start: &&[String]| {
+        let rests: Vec<&[String]> = all.iter().filter_map(|words| words.strip_prefix(*start)).collect();
+        rests.len() > 1 && 2 * rests.len() > all.len() && rests.iter().any(|rest| role(rest).is_some())
+    };
+    let starts = all.iter().flat_map(|words| (1..words.len()).map(|count| &words[..count]));
+    starts.filter(is_shared).max_by_key(|start| start.len()).unwrap_or_default()
+}
+
 /// The role of each file of a folder, by its stem; `None` if the name tells nothing.
 pub fn roles(stems: &[&str]) -> Vec<Option<Role>> {
     let all: Vec<Vec<String>> = stems.iter().map(|stem| words(stem)).collect();
-    let mut shared = 0;
-    if let [first, rest @ ..] = &all[..]
-        && !rest.is_empty()
-    {
-        shared =
-            (0..first.len()).take_while(|&i| rest.iter().all(|other| other.get(i) == first.get(i))).count();
-    }
-    all.iter().map(|words| role(&words[shared..])).collect()
+    let start = beginning(&all);
+    all.iter()
+        .map(|words| {
+            let shared = words.iter().zip(start).take_while(|(own, shared)| own == shared).count();
+            role(&words[shared..])
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -396,5 +419,12 @@ mod tests {
     fn the_name_of_the_material_is_not_a_role() {
         assert_eq!(all(&["rusty_metal", "rusty_metal_color"]), [None, Some(Role::BaseColor)]);
         assert_eq!(all(&["gloss_paint_diffuse", "gloss_paint_roughness"])[0], Some(Role::BaseColor));
+        let stranger = ["rusty_metal_02_diff_1k", "rusty_metal_02_rough_1k", "render"];
+        assert_eq!(all(&stranger), [Some(Role::BaseColor), Some(Role::Roughness), None]);
+        // Two variants of one map have no name of a material.
+        let variants = ["base_color", "base_color_2", "roughness"];
+        assert_eq!(all(&variants), [Some(Role::BaseColor), Some(Role::BaseColor), Some(Role::Roughness)]);
+        let named = variants.map(|name| format!("old_metal_{name}"));
+        assert_eq!(all(&named.each_ref().map(String::as_str)), all(&variants));
     }
 }

@@ -20,11 +20,12 @@ pub fn open(spec: &str, options: &Options, observer: &dyn Observer) -> Result<Do
         return Err(DocumentError::Samples { found: options.samples });
     }
     let space = Space::half_angle(options.samples);
-    if let Some(name) = spec.strip_prefix("sample:") {
-        return sample::open(name, space, observer);
-    }
     let mut path = Path::new(spec);
     let mut source = Source::new(observer);
+    if let Some(name) = spec.strip_prefix("sample:") {
+        note_unused_choices(options, &mut source);
+        return sample::open(name, space, source);
+    }
     let archive = !source.is_folder(path)? && source.head(path)?.starts_with(b"PK\x03\x04");
     if archive {
         source.mount(path)?;
@@ -32,11 +33,12 @@ pub fn open(spec: &str, options: &Options, observer: &dyn Observer) -> Result<Do
     let found;
     if source.is_folder(path)? {
         if source.is_file(&path.join(foil::INDEX)) {
+            note_unused_choices(options, &mut source);
             return foil::open(path, source);
         }
         match folder::locate(path, &mut source)? {
             folder::Found::Maps(folder) => {
-                note_unused_choice(options, &mut source);
+                note_unused_material(options, &mut source);
                 let mut document = folder::open(&folder, options, space, source)?;
                 // The folder is named after what it holds, `textures`, the download after the material.
                 if folder != path && document.name == name_of(&folder) {
@@ -52,16 +54,16 @@ pub fn open(spec: &str, options: &Options, observer: &dyn Observer) -> Result<Do
     }
     let head = source.head(path)?;
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
-    if head.starts_with(b"tensor_file\0") || extension == "bsdf" {
-        return rgl::open(path, space, source);
-    }
     if head.starts_with(b"glTF") || extension == "gltf" || extension == "glb" {
         return gltf::open(path, options, space, source);
     }
     if extension == "mtlx" {
         return materialx::open(path, options, space, source);
     }
-    note_unused_choice(options, &mut source);
+    note_unused_choices(options, &mut source);
+    if head.starts_with(b"tensor_file\0") || extension == "bsdf" {
+        return rgl::open(path, space, source);
+    }
     match extension.as_str() {
         "binary" => merl::open(path, space, source),
         "brdf" => gonio::open(path, space, source),
@@ -92,8 +94,18 @@ pub fn measured(path: &Path, observer: &dyn Observer) -> Result<Curve, DocumentE
 /// Reads a curve from a file's bytes.
 type Parser = fn(&[u8], &Path) -> Result<Curve, DocumentError>;
 
+/// Notes that choices have no effect on a document without maps of colours.
+fn note_unused_choices(options: &Options, source: &mut Source<'_>) {
+    note_unused_material(options, source);
+    if options.colour_space.is_some() {
+        source.note(
+            "the choice of a colour space has no effect: the document has no pictures of colours".into(),
+        );
+    }
+}
+
 /// Notes that the choice of a material has no effect.
-fn note_unused_choice(options: &Options, source: &mut Source<'_>) {
+fn note_unused_material(options: &Options, source: &mut Source<'_>) {
     if let Some(material) = &options.material {
         source.note(format!(
             "the choice of material `{material}` has no effect: only a glTF or MaterialX file can hold several materials"

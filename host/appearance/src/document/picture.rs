@@ -172,6 +172,13 @@ impl Picture {
         if self.channels < 3 { 1 } else { 3 }
     }
 
+    /// Whether its colours are equal, up to what a JPEG changes.
+    pub fn is_grey(&self) -> bool {
+        let green = self.channel(1);
+        let alike = |other: Plane| green.values().zip(other.values()).all(|(a, b)| (a - b).abs() <= 0.02);
+        self.colours() == 1 || alike(self.channel(0)) && alike(self.channel(2))
+    }
+
     /// Whether there is a channel of alpha.
     pub fn has_alpha(&self) -> bool {
         self.channels == 2 || self.channels == 4

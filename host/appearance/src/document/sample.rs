@@ -3,8 +3,6 @@
 use std::io::Write as _;
 use std::path::Path;
 
-use observe::Observer;
-
 use super::content::{ColourSpace, Content, Document};
 use super::error::DocumentError;
 use super::folder::{FolderSettings, SETTINGS, Workflow};
@@ -42,17 +40,16 @@ pub fn write_sample(sample: &Sample, folder: &Path) -> Result<(), DocumentError>
 }
 
 /// Opens a sample without touching the disk.
-pub(super) fn open(name: &str, space: Space, observer: &dyn Observer) -> Result<Document, DocumentError> {
+pub(super) fn open(name: &str, space: Space, mut source: Source<'_>) -> Result<Document, DocumentError> {
     let sample = Sample::named(name)?;
-    let mut source = Source::new(observer);
-    observer.begin("drawing", 1);
+    source.observer.begin("drawing", 1);
     let painting = sample.draw();
     for (file, data, _) in painting.maps() {
         source.take_in(file, &data);
     }
     let surfaces = painting.surfaces(space);
-    observer.advance(1);
-    observer.end();
+    source.observer.advance(1);
+    source.observer.end();
     let (notes, digest) = source.finish();
     let [width, height] = painting.size_mm();
     Ok(Document {

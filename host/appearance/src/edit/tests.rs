@@ -94,7 +94,7 @@ fn folder_bytes(folder: &Path) -> Vec<(String, Vec<u8>)> {
 }
 
 fn written(edited: &Edited, steps: &Steps, folder: &Path) -> Vec<(String, Vec<u8>)> {
-    foil::write(&edited.document, "a thing", None, folder).unwrap();
+    foil::write(&edited.document, "a thing", None, None, folder).unwrap();
     steps.write(folder, &edited.document.space).unwrap();
     folder_bytes(folder)
 }
@@ -363,7 +363,7 @@ fn a_basis_can_become_a_basis_of_another_document_or_a_curve() {
     let home = tempfile::tempdir().unwrap();
     let (one, other) = (document(3, 1), document(2, 2));
     let at = |name: &str| home.path().join(name).to_string_lossy().into_owned();
-    foil::write(&other, "other", None, Path::new(&at("other.foil"))).unwrap();
+    foil::write(&other, "other", None, None, Path::new(&at("other.foil"))).unwrap();
     let open = |name: &str| Replacement::open(&at(name), &one.space, &Silent);
     assert_eq!(open("other.foil:1").unwrap().row, other.bases.row(1));
     for (name, says) in

@@ -110,7 +110,9 @@ impl DotsArgs {
         };
         let halftoned = document::halftoned(&document, &library, &settings, &layout, observer)?;
         let report = &halftoned.mapped.report;
-        if !report.intent.uses_bases() && self.factor.is_chosen() {
+        if report.intent.uses_bases() {
+            self.factor.note_unused(&document, observer);
+        } else if self.factor.is_chosen() {
             observer.note(match report.not_blended {
                 None => "every pixel was fitted by itself, so --bases and --factor change nothing; --intent basis uses bases",
                 Some(_) => {

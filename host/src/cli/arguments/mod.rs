@@ -161,6 +161,15 @@ impl FactorArgs {
         self.bases.is_some() || self.method != Method::default()
     }
 
+    /// Says that a choice of bases has no effect on a document that has its own.
+    pub fn note_unused(&self, document: &Document, observer: &dyn Observer) {
+        if self.is_chosen() && document.as_factored().is_some() {
+            observer.note(
+                "the document came factored and keeps its bases, so --bases and --factor change nothing",
+            );
+        }
+    }
+
     /// The settings meant.
     pub fn settings(&self) -> factor::FactorSettings {
         factor::FactorSettings {

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
 
 use crate::cli::arguments::choice::{choice, utf8};
@@ -13,7 +13,10 @@ use crate::cli::arguments::layout::{LayoutArgs, MediaArgs};
 use crate::cli::arguments::{DocumentArgs, FactorArgs, GamutArgs, HalftoneArg, InkArgs};
 use crate::cli::console::print_job;
 use crate::cli::output::{self, Kind, Staged};
-use appearance::document::{self, ColourSpace, foil};
+use appearance::document::foil::{self, Origin};
+use appearance::document::{self, ColourSpace, Document};
+use appearance::edit::fingerprint;
+use appearance::factor::Factored;
 use appearance::gamut::files::Provenance;
 use appearance::gamut::{self, GamutError, Printable};
 use halftone::metrics;
@@ -56,7 +59,9 @@ impl Factor {
         if let Some(report) = report {
             observer.note(&report.to_string());
         }
-        foil::write(&factored, &document.name, document.size_mm, staged.path())?;
+        self.factor.note_unused(&document, observer);
+        let origin = Origin { document: document.digest.clone(), result: fingerprint(&factored) };
+        foil::write(&factored, &document.name, document.size_mm, Some(origin), staged.path())?;
         staged.commit()
     }
 }
@@ -110,6 +115,9 @@ impl Map {
                 document::open(spec, &options, observer)
             })
             .transpose()?;
+        if let Some(document) = &document {
+            self.check_origin(document, &factored, observer)?;
+        }
         let staged = Staged::folder(&named(&self.output, &self.factored, "mix"), Kind::Mix)?;
         let printable = Printable::combined(&library, &set, &factored.space);
         let materials = document.as_ref().map(|document| document.materials());
@@ -124,6 +132,24 @@ impl Map {
         };
         gamut::files::save(&mapped.mix, &provenance, staged.path())?;
         staged.commit()
+    }
+
+    /// With a document its pixels are mapped, and only their bases come from what was factored: so it must be the one that was factored,
+    /// and nothing may have been changed since.
+    fn check_origin(&self, document: &Document, factored: &Factored, observer: &dyn Observer) -> Result<()> {
+        let problem = match foil::origin(&self.factored, observer)? {
+            None => "it was edited, or made by hand",
+            Some(origin) if origin.document != document.digest => "it was factored from another document",
+            Some(origin) if origin.result != fingerprint(factored) => {
+                "its bases or weights were changed since it was factored"
+            }
+            Some(_) => return Ok(()),
+        };
+        bail!(
+            "{}: {problem}, and --document maps the pixels of the document itself; leave --document out to map what is in {}",
+            self.factored.display(),
+            self.factored.display()
+        )
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::settings::{FolderSettings, SETTINGS};
 use crate::document::error::{DocumentError, list};
-use crate::document::names::{self, Role};
+use crate::document::names::{self, Role, stem};
 use crate::document::source::Source;
 
 /// The files of a folder by role, and all image files for error messages.
@@ -50,6 +50,20 @@ impl Files {
             {
                 files.by_role.push((role, name.clone()));
             }
+        }
+        let named = |name: &str| settings.maps.named().any(|(_, named)| named == name);
+        let unused = |role: &Option<Role>| matches!(role, None | Some(Role::Ignored));
+        let unused: Vec<String> = seen
+            .iter()
+            .zip(&roles)
+            .filter(|(name, role)| unused(role) && !named(name))
+            .map(|(name, _)| name.clone())
+            .collect();
+        if !unused.is_empty() {
+            source.note(format!(
+                "not used: {}; by their names they are no maps of reflectance ([maps] in {SETTINGS} can name them)",
+                list(&unused)
+            ));
         }
         files.choose_normal(source);
         files.without_foreign(&foreign, &roles[seen.len()..], source)?;
@@ -128,11 +142,6 @@ impl Files {
             ))),
         }
     }
-}
-
-/// A file's name without its ending.
-fn stem(name: &str) -> &str {
-    name.rsplit_once('.').map_or(name, |(stem, _)| stem)
 }
 
 /// Whether these names of files hold a base colour map.

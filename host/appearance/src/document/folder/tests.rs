@@ -223,6 +223,46 @@ fn relief_widens_the_lobe_and_gives_a_note() {
 }
 
 #[test]
+fn pictures_that_are_no_maps_by_their_names_are_named_in_a_note() {
+    let folder = Folder::new()
+        .png("Metal06_col.png", rgb(2, 2, [10, 200, 60]))
+        .png("Metal06_rgh.png", grey(2, 2, 128))
+        .png("Metal06_met.png", grey(2, 2, 255))
+        .png("Metal06_disp.png", grey(2, 2, 128))
+        .png("Metal06_opacity.png", grey(2, 2, 128))
+        .png("render.png", grey(2, 2, 0));
+    let (surfaces, notes) = folder.surfaces();
+    assert!(
+        surfaces.surface(0).diffuse.iter().all(|&part| part < 1e-4),
+        "a metal: {:?}",
+        surfaces.surface(0)
+    );
+    noted(&notes, "not used: Metal06_disp.png, render.png;");
+    noted(&notes, "not printed: Metal06_opacity.png;");
+}
+
+#[test]
+fn a_rough_metals_roughness_is_no_packed_map() {
+    let roughness = |picture: DynamicImage| {
+        // One file alone does not tell where the name of the material ends.
+        let folder =
+            Folder::new().png("albedo.png", rgb(2, 2, [90, 90, 90])).png("old_metal_rough.png", picture);
+        folder.surfaces()
+    };
+    let alone = (128.0f32 / 255.0).powi(2);
+    for one in [grey(2, 2, 128).into(), rgb(2, 2, [128; 3]).into()] {
+        let (surfaces, notes) = roughness(one);
+        let found = surfaces.surface(0);
+        assert!((found.alpha - alone).abs() < 1e-3 && found.diffuse[0] > 0.05, "{found:?}");
+        noted(&notes, "old_metal_rough.png: read as roughness alone");
+        noted(&notes, "no metallic map");
+    }
+    let (surfaces, notes) = roughness(rgb(2, 2, [0, 128, 255]).into());
+    assert!(surfaces.surface(0).diffuse[0] < 1e-4, "{:?}", surfaces.surface(0));
+    noted(&notes, "roughness is read from green, metallic from blue");
+}
+
+#[test]
 fn each_mistake_has_its_message() {
     let base = || Folder::new().png("albedo.png", grey(2, 2, 128));
     let full = || base().png("roughness.png", grey(2, 2, 9)).png("metallic.png", grey(2, 2, 9));

@@ -5,6 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use ::gltf::json;
+use ::gltf::json::extensions::texture::TextureTransform;
 use base64::Engine;
 use percent_encoding::percent_decode_str;
 
@@ -20,17 +21,16 @@ pub(super) struct Placement {
     offset: [f32; 2],
     rotation: f32,
     scale: [f32; 2],
-    pub(super) coordinates: u32,
+    coordinates: u32,
 }
 
 impl Placement {
-    fn from_texture(info: &json::texture::Info) -> Placement {
-        let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
+    pub(super) fn new(coordinates: u32, transform: Option<&TextureTransform>) -> Placement {
         Placement {
             offset: transform.map_or([0.0; 2], |t| t.offset.0),
             rotation: transform.map_or(0.0, |t| t.rotation.0),
             scale: transform.map_or([1.0; 2], |t| t.scale.0),
-            coordinates: transform.and_then(|t| t.tex_coord).unwrap_or(info.tex_coord),
+            coordinates: transform.and_then(|t| t.tex_coord).unwrap_or(coordinates),
         }
     }
 
@@ -38,6 +38,9 @@ impl Placement {
         self.offset == [0.0; 2] && self.rotation == 0.0 && self.scale == [1.0; 2]
     }
 }
+
+/// Decodes an image: with a word on its alpha if that is not read, or without.
+pub(super) type Decode = fn(&[u8], &Path, &mut Source<'_>) -> Result<Picture, DocumentError>;
 
 /// A decoded texture and its name.
 pub(super) struct Loaded {
@@ -60,8 +63,14 @@ impl<'a> Loader<'a, '_> {
     }
 
     /// The image of a map that must align with the others.
-    pub(super) fn load(&mut self, info: &json::texture::Info, field: &str) -> Result<Loaded, DocumentError> {
-        let placement = Placement::from_texture(info);
+    pub(super) fn load(
+        &mut self,
+        info: &json::texture::Info,
+        field: &str,
+        decode: Decode,
+    ) -> Result<Loaded, DocumentError> {
+        let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
+        let placement = Placement::new(info.tex_coord, transform);
         match self.placement {
             None => {
                 if !placement.is_plain() {
@@ -81,10 +90,15 @@ impl<'a> Loader<'a, '_> {
             }
             Some(_) => {}
         }
-        self.texture(info.index.value(), field)
+        self.texture(info.index.value(), field, decode)
     }
 
-    pub(super) fn texture(&mut self, index: usize, field: &str) -> Result<Loaded, DocumentError> {
+    pub(super) fn texture(
+        &mut self,
+        index: usize,
+        field: &str,
+        decode: Decode,
+    ) -> Result<Loaded, DocumentError> {
         let Some(texture) = self.root.textures.get(index) else {
             return Err(self.wrong(field, format!("texture {index} does not exist")));
         };
@@ -124,7 +138,7 @@ impl<'a> Loader<'a, '_> {
                 return Err(self.wrong(field, format!("image {number} has neither uri nor bufferView")));
             }
         };
-        let picture = Picture::decode(&bytes, &name, self.source)?;
+        let picture = decode(&bytes, &name, self.source)?;
         self.source.observer.advance(1);
         let name = name.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         Ok(Loaded { name, picture })
@@ -199,7 +213,7 @@ impl<'a> Loader<'a, '_> {
         field: &str,
     ) -> Result<[Field; 3], DocumentError> {
         let Some(info) = info else { return Ok(factor.map(Field::Constant)) };
-        let Loaded { name, picture } = self.load(info, field)?;
+        let Loaded { name, picture } = self.load(info, field, Picture::decode)?;
         let how = if space == ColourSpace::Srgb { "sRGB" } else { "linear" };
         self.source.note(format!("{name}: {field} read as {how}"));
         if picture.has_foreign_profile() {

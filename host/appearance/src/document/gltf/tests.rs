@@ -230,6 +230,63 @@ fn a_clear_coat_is_a_second_lobe() {
 }
 
 #[test]
+fn what_is_not_printed_is_noted_and_alpha_that_is_read_is_not_called_ignored() {
+    let folder = tempfile::tempdir().unwrap();
+    let alpha: Vec<u8> = (0..4).flat_map(|i| [200, 100, 50, 60 * i]).collect();
+    let mut picture = Vec::new();
+    PngEncoder::new(&mut picture).write_image(&alpha, 2, 2, ExtendedColorType::Rgba8).unwrap();
+    let notes = |material: &str| {
+        let text = format!(
+            r#"{{"asset":{{"version":"2.0","extras":"made by hand"}},"images":[{{"uri":"{}"}}],"textures":[{{"source":0}}],
+            "materials":[{{"extras":7,{material}}}]}}"#,
+            data_uri(&picture)
+        );
+        let path = folder.path().join("a.gltf");
+        std::fs::write(&path, text).unwrap();
+        surfaces(&path, None).unwrap().1.notes.join("; ")
+    };
+    let plain = r#""pbrMetallicRoughness":{"baseColorTexture":{"index":0}}"#;
+    let said = notes(plain);
+    assert!(said.contains("alpha is ignored") && !said.contains("not printed"), "{said}");
+    let said = notes(&format!(r#"{plain},"emissiveFactor":[0,0.5,0],"alphaMode":"BLEND""#));
+    assert!(said.contains("not printed: emission, transparency"), "{said}");
+    let said = notes(
+        r#""extensions":{"KHR_materials_pbrSpecularGlossiness":{"specularGlossinessTexture":{"index":0}}}"#,
+    );
+    assert!(said.contains("alpha is read as glossiness") && !said.contains("ignored"), "{said}");
+    let said = notes(r#""extensions":{"KHR_materials_specular":{"specularTexture":{"index":0}}}"#);
+    assert!(said.contains("alpha is read as the strength") && !said.contains("ignored"), "{said}");
+}
+
+#[test]
+fn normals_that_lie_otherwise_than_the_other_maps_are_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let bumps = data_uri(&png(8, 8, |i| if i % 2 == 0 { [200, 128, 220] } else { [56, 128, 220] }));
+    let base = data_uri(&png(8, 8, |_| [90, 120, 150]));
+    let alpha = |own: &str, others: &str| {
+        let text = format!(
+            r#"{{"asset":{{"version":"2.0"}},"images":[{{"uri":"{base}"}},{{"uri":"{bumps}"}}],"textures":[{{"source":0}},{{"source":1}}],
+            "materials":[{{"normalTexture":{{"index":1{own}}},"pbrMetallicRoughness":{{"roughnessFactor":0.2,
+            "baseColorTexture":{{"index":0{others}}}}}}}]}}"#
+        );
+        let path = folder.path().join("a.gltf");
+        std::fs::write(&path, text).unwrap();
+        let (surfaces, document) = surfaces(&path, None).unwrap();
+        (surfaces.surface(0).alpha, document.notes.join("; "))
+    };
+    let scaled = r#","extensions":{"KHR_texture_transform":{"scale":[10,10]}}"#;
+    let smooth = 0.2f32.powi(2);
+    for (own, others) in [("", ""), (scaled, scaled)] {
+        let (found, notes) = alpha(own, others);
+        assert!(found > 1.5 * smooth && !notes.contains("normalTexture: ignored"), "{found} {notes}");
+    }
+    for (own, others) in [(scaled, ""), ("", scaled), (r#","texCoord":1"#, "")] {
+        let (found, notes) = alpha(own, others);
+        assert!((found - smooth).abs() < 1e-4 && notes.contains("normalTexture: ignored"), "{found} {notes}");
+    }
+}
+
+#[test]
 fn unlit_materials_are_matt_and_vertex_colours_noted() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.gltf");

@@ -62,6 +62,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<String> {
     let (set, library) = inks.at_hand()?;
     let opening = DocumentArgs::named(args.document.clone());
     let document = opening.open(|| Ok((set, library.clone())), observer)?;
+    args.factor.note_unused(&document, observer);
     let (factored, _) = stages::factored(&document, &args.factor.settings(), observer)?;
     let space = &factored.space;
     let printable = Printable::combined(&library, &set, space);
