@@ -198,7 +198,7 @@ impl Library {
         self.rules.iter().filter(|rule| rule.broken_by(stack)).collect()
     }
 
-    /// The minimum cluster of a stack in dots: that of its most demanding layer.
+    /// The minimum cluster of a stack in dots: that of the paper or its most demanding layer.
     pub fn minimum_cluster(&self, stack: &Stack) -> u16 {
         let bare = self.optics.paper.minimum_cluster.get();
         let layers = stack.layers().iter().filter_map(|&ink| self.cartridge(ink));

@@ -78,7 +78,7 @@ impl FromStr for Replacing {
     foilpress factor sample:ladder --bases 6 -o ladder.foil\n  \
     foilpress edit ladder.foil --show\n  \
     foilpress edit ladder.foil --basis 2 --rougher 1.5 --tint '#c08040' -o edited.foil\n  \
-    foilpress edit edited.foil --swap 1,4 --mask basis:1,0.5 -o again.foil\n  \
+    foilpress edit edited.foil --swap 2,4 --mask basis:2,0.5 -o again.foil\n  \
     foilpress edit ladder.foil --steps again.foil/steps.toml -o replayed.foil\n\n\
     DOC never changes. The edited document keeps its steps as steps.toml, beside their masks and curves: change them by hand\n\
     and replay them on the document that was edited first. Under a mask a basis is split: the edited one is new and gets the\n\
@@ -172,7 +172,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         let mut all = kept;
         all.steps.extend(added);
         all.result = Some(fingerprint(&edited.document));
-        foil::write(&edited.document, &document.name, document.size_mm, staged.path())?;
+        foil::write(&edited.document, &document.name, document.size_mm, None, staged.path())?;
         all.write(staged.path(), &edited.document.space)?;
         staged.commit()?;
         let steps = match all.steps.len() {

@@ -25,10 +25,11 @@ const HOLD: Duration = Duration::from_secs(3);
 /// Arguments of `bridge test`.
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  foilpress bridge test\n  foilpress bridge test --pattern\n\n\
-    The loop-back plug goes on the end of the cable in place of the printer; docs/wiring.md says how to make one. It has three \
-    positions, and the test waits until it has been in each. --pattern needs no plug: it holds one output after the other at \
-    its opposite level for three seconds each. Never run this command with a printer connected: a printer would take the \
-    signals for a job.")]
+    Take the cable off the printer first, and put the loop-back plug on its end; docs/wiring.md says how to make one. The \
+    plug has three positions, and the test waits until it has been in each. The test looks for the plug with the data lines \
+    only, which a printer ignores, and goes on only when it has found one: what follows would reset a printer and send it \
+    bytes. --pattern needs no plug: it holds one output after the other at its opposite level for three seconds each. It \
+    refuses to run while something that is switched on is connected.")]
 pub struct Args {
     /// Address of the bridge [default: the only one]
     #[arg(long, value_name = "WHERE")]
