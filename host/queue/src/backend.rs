@@ -5,8 +5,9 @@
 //! Method: a job's sheets go one after the other to the [delivery](device::deliver), as every command's do. Each has a journal
 //! of its own under the job's identity, so a process that takes over knows what was sent and continues where the printer is. A
 //! sheet whose outcome is unknown, and a printer that has to be reset, hold the job: nobody can be asked here. Whoever releases
-//! a held job agrees to the reset and to printing the sheet again. SIGTERM ends the sheet at the bridge.
-//! What an earlier job has left open at the bridge is ended first.
+//! a held job agrees to the reset and to printing the sheet again. SIGTERM ends the sheet at the bridge, also one that an earlier process
+//! has begun.
+//! What an earlier job has left open at the bridge is ended first; a server of its own sees to it that no other job of its is among those.
 //! For the print system the backend ends when the last sheet is *sent*: while the printer prints from its own memory the next job
 //! may come. A server of its own waits until each sheet is out.
 //! Limits: jobs of up to 1 GB. A raw device tells nothing, so a job that was interrupted there is held.
@@ -20,7 +21,7 @@ use std::borrow::Cow;
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
@@ -138,6 +139,21 @@ fn forget_folder(folder: &Path, messages: &dyn Report) {
     }
 }
 
+/// Whether a sheet of a job may be open at the bridge: it was begun there, and its end is not on record.
+pub fn is_open(to: &Destination, job: &Path) -> bool {
+    let open = |sheet: PathBuf| {
+        let entries = Journal::at(&sheet).and_then(|journal| journal.entries()).unwrap_or_default();
+        entries.iter().any(|entry| !matches!(entry.record.phase, Phase::Queued | Phase::Ended(_)))
+    };
+    matches!(to, Destination::Bridge(_)) && folders(job).any(open)
+}
+
+/// The folders of a job's sheets.
+fn folders(job: &Path) -> impl Iterator<Item = PathBuf> {
+    let found = fs::read_dir(job).into_iter().flatten().filter_map(|item| Some(item.ok()?.path()));
+    found.filter(|path| path.is_dir())
+}
+
 /// Prints sheets, one after the other; says whether all of them were sent. What is known of them stays until [`forget`], so that
 /// it outlives whoever keeps the job. `given_up` says whether a job that was stopped is not to go on later.
 pub fn deliver(
@@ -195,7 +211,10 @@ impl Backend<'_> {
     }
 
     fn deliver(&self, sheets: &dyn Sheets) -> Result<bool, Stopped> {
-        if self.system.stops() {
+        let folder = self.call.journal.join(&self.call.identity);
+        // What an earlier process has begun of a job that is stopped is ended, and nothing more is begun.
+        let ends = self.system.stops();
+        if ends && !is_open(&self.call.to, &folder) {
             return Ok(false);
         }
         // All are judged before the first byte leaves.
@@ -210,8 +229,7 @@ impl Backend<'_> {
         if checked.iter().any(|sheet| sheet.dialect.is_some()) {
             self.messages.info("the job is in another driver's dialect; it is sent unchanged");
         }
-        let folder = self.call.journal.join(&self.call.identity);
-        if let Destination::Bridge(address) = &self.call.to {
+        if let (Destination::Bridge(address), false) = (&self.call.to, ends) {
             self.end_what_was_left(address, &folder)?;
         }
         let mut number = 0;
@@ -219,8 +237,8 @@ impl Backend<'_> {
             for (index, checked) in checked.iter().enumerate() {
                 number += 1;
                 let own = folder.join(format!("{number:04}"));
-                let sent =
-                    !self.system.stops() && self.sheet(&self.bytes(sheets, index)?, checked, &own, number)?;
+                let goes = if ends { own.is_dir() } else { !self.system.stops() };
+                let sent = goes && self.sheet(&self.bytes(sheets, index)?, checked, &own, number)?;
                 if !sent {
                     // Of a job without a printed sheet there is nothing to remember: if it is started again, it begins anew.
                     // One that was only stopped goes on after its printed sheets.
@@ -250,12 +268,16 @@ impl Backend<'_> {
 
     fn to_bridge(&self, job: Job<'_>, address: &Address, folder: &Path) -> Result<bool, Stopped> {
         let failed = |failure: Failure| self.failed(failure, folder);
+        // Nobody kills a server of its own while it waits.
+        self.system.is_patient(self.call.awaits_sheets);
         let journal = Journal::at(folder).map_err(|error| failed(error.into()))?;
         let known = journal.entries().map_err(|error| failed(error.into()))?.pop();
         let sent = match known {
             Some(Entry { record, .. }) if record.phase == Phase::Ended(Outcome::Printed) => return Ok(true),
             Some(Entry { record, .. }) if !matches!(record.phase, Phase::Ended(_)) => {
-                self.messages.info("the job was interrupted; it continues where the printer is");
+                if !self.system.stops() {
+                    self.messages.info("the job was interrupted; it continues where the printer is");
+                }
                 journal.open(record.job).map_err(Failure::from)
             }
             // Whoever started a job again whose sheet had ended badly wants another one.
@@ -405,9 +427,8 @@ impl Backend<'_> {
     fn end_what_was_left(&self, address: &Address, own: &Path) -> Result<(), Stopped> {
         let Ok(listing) = fs::read_dir(&self.call.journal) else { return Ok(()) };
         for job in listing.filter_map(|item| Some(item.ok()?.path())).filter(|path| path != own) {
-            let sheets = fs::read_dir(&job).into_iter().flatten().filter_map(|item| Some(item.ok()?.path()));
             let mut open = false;
-            for folder in sheets.filter(|path| path.is_dir()) {
+            for folder in folders(&job) {
                 open |= !self.end_sheet(address, &folder)?;
             }
             let age =

@@ -20,6 +20,7 @@ use device::connection::Destination;
 use device::printers::Printers;
 use observe::Observer;
 use protocol::paper::Paper;
+use queue::backend;
 use queue::messages::Reason;
 use queue::options::Choices;
 
@@ -259,6 +260,16 @@ impl Server {
         identity(&self.data(), of)
     }
 
+    /// What the delivery knows of jobs.
+    pub fn sent(&self) -> PathBuf {
+        self.settings.folder.join("sent")
+    }
+
+    /// Whether a sheet of a job may be open at the bridge.
+    pub fn is_open(&self, job: &Job) -> bool {
+        job.begun.is_some() && backend::is_open(&self.settings.to, &self.sent().join(job.identity()))
+    }
+
     /// Takes a job without its document.
     ///
     /// # Errors
@@ -349,14 +360,18 @@ impl Server {
         data.jobs.remove(&id);
     }
 
-    /// Ends a job: at once if nothing of it is on its way, else as soon as the device allows.
+    /// Ends a job: at once if nothing of it is on its way, else as soon as the device allows. A sheet that is open at the bridge
+    /// from before a restart, or from before the job was held, is on its way.
     ///
     /// # Errors
     /// It is over, or there is none.
     pub fn cancel(&self, id: u32) -> Result<(), ChangeError> {
         let over = self.change(id, |job| match job.state {
             state if state.is_over() => Err(ChangeError::State("over")),
-            State::Processing => {
+            state if state == State::Processing || self.is_open(job) => {
+                if state == State::Held {
+                    job.state = State::Pending;
+                }
                 job.cancel = true;
                 job.message = "cancelling".into();
                 Ok(false)
@@ -379,7 +394,8 @@ impl Server {
     /// It has, or there is none.
     pub fn hold(&self, id: u32) -> Result<(), ChangeError> {
         self.change(id, |job| match job.state {
-            State::Pending | State::Held => {
+            State::Held => Ok(()),
+            State::Pending if !job.cancel && !self.is_open(job) => {
                 job.state = State::Held;
                 Ok(())
             }
@@ -426,15 +442,22 @@ impl Server {
         Ok(())
     }
 
-    /// Waits for the next job to print; it is processing then.
+    /// Waits for the next job to print; it is processing then. The bridge has one sheet at a time, so the job whose sheet is open there
+    /// goes before all others, and while it is held nobody goes.
     pub fn next(&self) -> Job {
         let mut data = self.data();
         loop {
-            let next = data.jobs.values().find(|job| job.state == State::Pending).cloned();
+            let mut jobs = data.jobs.values();
+            let open =
+                jobs.find(|job| matches!(job.state, State::Pending | State::Held) && self.is_open(job));
+            let first = || data.jobs.values().find(|job| job.state == State::Pending);
+            let next = open.or_else(first).filter(|job| job.state == State::Pending).cloned();
             if let Some(mut job) = next {
                 job.state = State::Processing;
                 job.begun.get_or_insert(now());
-                job.message.clear();
+                if !job.cancel {
+                    job.message.clear();
+                }
                 // If it cannot be saved it is printed all the same: a restart makes it pending again anyway.
                 let _ = self.store.save(&job);
                 data.jobs.insert(job.id, job.clone());

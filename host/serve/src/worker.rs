@@ -55,14 +55,15 @@ fn print(server: &Server, job: &Job) -> Result<(), ChangeError> {
         copies: job.ticket.copies,
         file: None,
         to: server.settings.to.clone(),
-        journal: server.settings.folder.join("sent"),
+        journal: server.sent(),
         awaits_sheets: true,
         in_class: false,
         listed: (String::new(), String::new()),
         lister: PathBuf::new(),
     };
     let drawn = prepare_for(server, job.id, &voice);
-    if voice.is_cancelled() {
+    // A sheet that is open at the bridge is ended there first, whatever became of the job.
+    if voice.is_cancelled() && !server.is_open(job) {
         return end(server, &call, &voice, State::Canceled, "cancelled");
     }
     if let Err(why) = drawn {
@@ -95,7 +96,10 @@ fn end(server: &Server, call: &Call, voice: &Voice<'_>, state: State, why: &str)
         Ok(())
     })?;
     voice.reasons(&[]);
-    backend::forget(call, voice);
+    // What is still open, as at a bridge that is another one now, is ended before the next job there.
+    if !backend::is_open(&call.to, &call.journal.join(&call.identity)) {
+        backend::forget(call, voice);
+    }
     Ok(server.store.clear(voice.id, false)?)
 }
 

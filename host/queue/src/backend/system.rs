@@ -29,6 +29,8 @@ pub(super) struct System<'a> {
     stop: &'a (dyn Fn() -> bool + Sync),
     stopped: Cell<Option<Instant>>,
     in_class: bool,
+    /// Whether a sheet that was begun is waited for until it has ended, also once the job is to end.
+    patient: Cell<bool>,
     /// Whether somebody has released the job after it was held.
     released: Cell<bool>,
     /// Where it is to be noted that a device gets the first byte, and why that could not be done.
@@ -58,6 +60,7 @@ impl<'a> System<'a> {
             stop,
             stopped: Cell::new(None),
             in_class,
+            patient: Cell::new(false),
             released: Cell::new(false),
             begun: RefCell::default(),
             not_noted: RefCell::default(),
@@ -68,6 +71,11 @@ impl<'a> System<'a> {
     /// Whether the print system wants the job ended.
     pub(super) fn stops(&self) -> bool {
         (self.stop)()
+    }
+
+    /// Whether the sheet that follows is waited for until it has ended, if it has begun.
+    pub(super) fn is_patient(&self, patient: bool) {
+        self.patient.set(patient);
     }
 
     /// Whether the sheet that follows belongs to a job somebody has released.
@@ -211,11 +219,18 @@ impl Caller for System<'_> {
         }
         let reason = if obstacle.is_in_use() { Reason::Connecting } else { Reason::OffLine };
         self.messages.reasons(&[Reason::Connecting, reason]);
-        self.messages.info(&format!(
-            "{}. Nothing is lost; the job continues when the printer can be reached",
-            observe::with_causes(obstacle)
-        ));
-        self.pause()
+        let then = if self.stops() { "The sheet is ended" } else { "Nothing is lost; the job continues" };
+        let why = observe::with_causes(obstacle);
+        self.messages.info(&format!("{why}. {then} when the printer can be reached"));
+        if self.pause() {
+            return true;
+        }
+        let waits = begun && self.patient.get();
+        if waits {
+            // A job that is to end does not pause, and the next attempt would follow at once.
+            std::thread::sleep(RETRY);
+        }
+        waits
     }
 
     fn wish(&self) -> Wish {
@@ -227,7 +242,7 @@ impl Caller for System<'_> {
         }
         let stopped = self.stopped.get().unwrap_or_else(Instant::now);
         self.stopped.set(Some(stopped));
-        if stopped.elapsed() < LAST_WORDS { Wish::Cancel } else { Wish::Leave }
+        if self.patient.get() || stopped.elapsed() < LAST_WORDS { Wish::Cancel } else { Wish::Leave }
     }
 
     fn watches(&self) -> bool {

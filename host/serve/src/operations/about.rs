@@ -55,10 +55,10 @@ fn stops(reason: Reason) -> bool {
 pub fn state(data: &Data, job: &Job) -> (i32, Vec<&'static str>) {
     match job.state {
         State::Incoming => (4, vec!["job-incoming"]),
-        State::Pending => (3, vec!["none"]),
         State::Held if job.ticket.held && job.begun.is_none() => (4, vec!["job-hold-until-specified"]),
         State::Held => (4, vec!["job-held-on-create"]),
-        State::Processing if job.cancel => (5, vec!["processing-to-stop-point"]),
+        State::Processing | State::Pending if job.cancel => (5, vec!["processing-to-stop-point"]),
+        State::Pending => (3, vec!["none"]),
         State::Processing if data.reasons.iter().any(|&reason| stops(reason)) => {
             (6, vec!["printer-stopped", "job-printing"])
         }

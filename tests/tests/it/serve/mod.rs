@@ -4,6 +4,7 @@ use std::fs;
 use std::io::{BufRead as _, BufReader};
 use std::net::SocketAddr;
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crate::queue::server::{self, Server};
@@ -52,6 +53,13 @@ impl Serving {
         self.child.wait().unwrap();
     }
 
+    fn release(&self, job: i32) {
+        const RELEASE: u16 = 0x0d;
+        let uri = format!("ipp://{}/ipp/print", self.address);
+        let released = ipp::request(RELEASE, &uri, &[(0x21, "job-id", &job.to_be_bytes())], &[]);
+        assert_eq!(ipp::ask(self.address, &released).unwrap().0, 0);
+    }
+
     pub(crate) fn wait_for(&self, job: i32) -> i32 {
         let start = Instant::now();
         loop {
@@ -66,13 +74,116 @@ impl Serving {
 
 /// A job of one small sheet, no two alike.
 fn job(seed: u64) -> Vec<u8> {
+    drawn(seed, 40)
+}
+
+/// A job of one sheet with so many rows of dots, no two alike.
+fn drawn(seed: u64, rows: usize) -> Vec<u8> {
     let mut bits = vec![0; 100 * 400];
-    seeded(seed).fill_bytes(&mut bits[..100 * 40]);
+    seeded(seed).fill_bytes(&mut bits[..100 * rows]);
     let pass = Pass { ink: Ink::Black, plane: Plane { width: 800, length: 400, stride: 100, bits } };
     let mut bytes = Vec::new();
     let page = Page::plain(Paper::Custom { width: 800, length: 400 });
     write_job(page, None, &[pass], &mut bytes, &Silent).unwrap();
     bytes
+}
+
+/// A server that was killed while the printer had a part of a sheet; the bridge holds a part of its rest at most.
+struct Interrupted {
+    bench: Bench,
+    bridge: Bridge,
+    to: String,
+    sheet: Vec<u8>,
+    job: i32,
+}
+
+impl Interrupted {
+    /// With `before` a job that came before and was held is released meanwhile.
+    fn new(before: bool) -> Interrupted {
+        let (bench, sheet) = (Bench::new(), drawn(2, 400));
+        let port = Port::new(&[Ink::Black], 64);
+        port.one_way.store(true, Ordering::Relaxed);
+        port.busy.store(true, Ordering::Relaxed);
+        let (bridge, address) = Bridge::on_tcp("127.0.0.1:0".parse().unwrap(), port).unwrap();
+        let to = format!("tcp:{address} --jobs serve");
+        let serving = Serving::start(&bench, &to);
+        if before {
+            let uri = format!("ipp://{}/ipp/print", serving.address);
+            let held = [(0x44, "job-hold-until", &b"indefinite"[..])];
+            let request = [ipp::request(ipp::PRINT, &uri, &[], &held), job(1)].concat();
+            assert_eq!(ipp::ask(serving.address, &request).unwrap().0, 0);
+        }
+        let job = ipp::print(serving.address, "standard", "interrupted", &sheet).unwrap();
+        let start = Instant::now();
+        while bridge.printed().is_empty() {
+            assert!(start.elapsed() < PATIENCE, "nothing is printed");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        if before {
+            serving.release(1);
+        }
+        serving.kill();
+        bridge.port.busy.store(false, Ordering::Relaxed);
+        Interrupted { bench, bridge, to, sheet, job }
+    }
+
+    fn again(&self) -> Serving {
+        Serving::start(&self.bench, &self.to)
+    }
+
+    /// Changes the record of the job.
+    fn set(&self, what: &str, to: serde_json::Value) {
+        let record = self.bench.path(&format!("serve/jobs/{}/job.json", self.job));
+        let mut kept: serde_json::Value = serde_json::from_slice(&fs::read(&record).unwrap()).unwrap();
+        assert_eq!(kept["state"], "processing");
+        kept[what] = to;
+        fs::write(&record, kept.to_string()).unwrap();
+    }
+
+    /// Everything that was printed, sheet by sheet.
+    fn sheets(&self) -> Vec<Vec<u8>> {
+        let printed = self.bridge.printed();
+        sheets(&printed).into_iter().map(|place| printed[place].to_vec()).collect()
+    }
+}
+
+#[test]
+fn after_a_restart_the_sheet_at_the_bridge_goes_on_before_an_earlier_job() {
+    let interrupted = Interrupted::new(true);
+    let serving = interrupted.again();
+    assert_eq!((serving.wait_for(interrupted.job), serving.wait_for(1)), (9, 9));
+    serving.kill();
+    assert!(interrupted.sheets() == [interrupted.sheet.clone(), job(1)]);
+}
+
+#[test]
+fn a_job_cancelled_before_a_restart_is_ended_at_the_bridge_first() {
+    let interrupted = Interrupted::new(false);
+    // As where the server was killed between the answer to the owner and its next word to the bridge.
+    interrupted.set("cancel", true.into());
+    let serving = interrupted.again();
+    assert_eq!(serving.wait_for(interrupted.job), 7);
+    let [cut] = &interrupted.sheets()[..] else { panic!("not one sheet") };
+    assert!(is_a_whole_job(cut) && cut.len() < interrupted.sheet.len());
+    let next = ipp::print(serving.address, "standard", "next", &job(3)).unwrap();
+    assert_eq!(serving.wait_for(next), 9);
+    serving.kill();
+    assert!(interrupted.sheets()[1..] == [job(3)]);
+}
+
+#[test]
+fn a_sheet_whose_job_is_held_is_ended_for_no_other_job() {
+    let interrupted = Interrupted::new(false);
+    // As where the disk was full in the middle of the sheet.
+    interrupted.set("state", "held".into());
+    let serving = interrupted.again();
+    let next = ipp::print(serving.address, "standard", "next", &job(3)).unwrap();
+    std::thread::sleep(Duration::from_secs(2));
+    assert_eq!(ipp::state(serving.address, next).unwrap(), 3);
+    serving.release(interrupted.job);
+    assert_eq!((serving.wait_for(interrupted.job), serving.wait_for(next)), (9, 9));
+    serving.kill();
+    assert!(interrupted.sheets() == [interrupted.sheet.clone(), job(3)]);
 }
 
 /// One document through `layers`, through the filter of a print queue and through the server: the same bytes for the printer.
@@ -173,7 +284,7 @@ fn a_server_killed_at_every_step_prints_each_job_once() {
     let bench = Bench::new();
     let port = Port::new(&[Ink::Black], 1 << 12);
     // The printer does not say when a sheet is out, so nobody waits for that.
-    port.one_way.store(true, std::sync::atomic::Ordering::Relaxed);
+    port.one_way.store(true, Ordering::Relaxed);
     let (bridge, address) = Bridge::on_tcp("127.0.0.1:0".parse().unwrap(), port).unwrap();
     let to = format!("tcp:{address}");
     let seed = SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_nanos() as u64;
