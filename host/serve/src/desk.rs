@@ -133,7 +133,7 @@ async fn upload(
     };
     let name = parameter(query, "name").unwrap_or_else(|| "Untitled".into());
     let owner = Owner { user: "desk".into(), from: Some(from) };
-    let created = || server.create(printer, &name, owner, on_loaded_sheet(server));
+    let created = || server.create(printer, &name, owner, waiting());
     let id = match tokio::task::block_in_place(created) {
         Ok(id) => id,
         Err(error) => return words(StatusCode::SERVICE_UNAVAILABLE, &with_causes(&error)),
@@ -149,11 +149,9 @@ async fn upload(
     })
 }
 
-/// What the page asks for: the loaded sheet, and to wait.
-fn on_loaded_sheet(server: &Server) -> Ticket {
-    let loaded = server.data().loaded().clone();
-    let kind = Some(loaded.kind).filter(|kind| kind != AUTO);
-    Ticket { size: Some(loaded.size), kind, held: true, ..Ticket::default() }
+/// What the page asks for: to wait.
+fn waiting() -> Ticket {
+    Ticket { held: true, ..Ticket::default() }
 }
 
 /// A job has its document, and waits; one whose document is none is forgotten.
@@ -174,7 +172,7 @@ fn chart(server: &Server, query: &str, from: IpAddr) -> Result<u32, String> {
     let printer =
         server.printer(&parameter(query, "printer").unwrap_or_default()).ok_or("there is no such printer")?;
     let name = parameter(query, "chart").unwrap_or_default();
-    let ticket = on_loaded_sheet(server);
+    let ticket = waiting().on(server.data().loaded());
     let bytes = {
         let _drawing = server.drawing.lock().unwrap_or_else(PoisonError::into_inner);
         let inks = {

@@ -12,6 +12,7 @@ use protocol::paper::Paper;
 use protocol::rgl::Media;
 use serde::{Deserialize, Serialize};
 
+use crate::server::Loaded;
 use crate::values::{each, read_text};
 use art::Intent;
 use halftone::Method;
@@ -281,6 +282,13 @@ impl Ticket {
             }),
             _ => FIXED.iter().any(|&(known, only)| known == name && word().as_deref() == Some(only)),
         }
+    }
+
+    /// The same where what is not asked for is the loaded sheet's, as the printer's attributes promise.
+    #[must_use]
+    pub fn on(self, loaded: &Loaded) -> Ticket {
+        let kind = self.kind.or_else(|| Some(loaded.kind.clone()));
+        Ticket { size: self.size.or(Some(loaded.size)), kind, ..self }
     }
 
     /// What a preset's printer draws for this job.

@@ -121,10 +121,13 @@ fn prepare_for(server: &Server, id: u32, voice: &Voice<'_>) -> Result<(), String
     if job.state.is_over() || job.state == State::Incoming {
         return Err("the job has no document that could be drawn".into());
     }
+    // Which sheet that is, is decided when the job is drawn, and stays known.
+    let job = Job { ticket: job.ticket.on(server.data().loaded()), ..job };
     draw(server, &job, voice)?;
     let count = Folder::of(&server.store.sheets(id)).files.len();
-    let kept = server.change(id, |job| {
-        job.sheets = Some(u32::try_from(count).unwrap_or(u32::MAX).saturating_mul(job.ticket.copies));
+    let kept = server.change(id, |kept| {
+        kept.sheets = Some(u32::try_from(count).unwrap_or(u32::MAX).saturating_mul(job.ticket.copies));
+        (kept.ticket.size, kept.ticket.kind) = (job.ticket.size, job.ticket.kind);
         Ok(())
     });
     kept.map_err(|error| with_causes(&error))

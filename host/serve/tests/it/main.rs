@@ -5,6 +5,7 @@ mod browser;
 mod clients;
 mod desk;
 mod devices;
+mod jobs;
 mod limits;
 mod rights;
 

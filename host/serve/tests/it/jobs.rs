@@ -1,0 +1,88 @@
+//! What becomes of jobs: on which sheet, which pages of them, and what is told of one that waits for somebody.
+
+use std::fs;
+use std::time::{Duration, Instant};
+
+use observe::Silent;
+use press::inspect::inspect;
+use protocol::paper::Paper;
+use serve::http::Limits;
+use serve::jobs::{Job, State};
+use serve::server::Loaded;
+use serve::template::{AUTO, size};
+use testing::ipp::{self, Attribute};
+
+use super::Running;
+
+impl Running {
+    fn job(&self, id: u32) -> Job {
+        self.server.data().jobs[&id].clone()
+    }
+
+    /// Prints a document with these attributes of the job; the job once it is in this state.
+    fn print(&self, asked: &[Attribute<'_>], document: &[u8], until: State) -> Job {
+        let uri = format!("ipp://{}/ipp/print", self.address);
+        let bytes = [ipp::request(ipp::PRINT, &uri, &[], asked), document.to_vec()].concat();
+        let (_, answer) = ipp::ask(self.address, &bytes).unwrap();
+        self.wait(ipp::number(&answer, "job-id").unwrap() as u32, until)
+    }
+
+    fn wait(&self, id: u32, until: State) -> Job {
+        let start = Instant::now();
+        loop {
+            let job = self.job(id);
+            if job.state == until {
+                return job;
+            }
+            assert!(start.elapsed() < Duration::from_secs(60), "{job:?}");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// What a request without a document is answered, as text.
+    fn asked(&self, operation: u16, job: u32) -> String {
+        let uri = format!("ipp://{}/ipp/print", self.address);
+        let number = job.to_be_bytes();
+        let about = [(0x21, "job-id", &number[..])];
+        let bytes = ipp::request(operation, &uri, if job == 0 { &[] } else { &about }, &[]);
+        String::from_utf8_lossy(&ipp::ask(self.address, &bytes).unwrap().1).into_owned()
+    }
+
+    fn sheets_of(&self, job: &Job) -> Vec<Vec<u8>> {
+        let begins = job.identity();
+        let kept = fs::read_dir(self.path("sheets")).unwrap().map(|entry| entry.unwrap().path());
+        let mut own: Vec<_> =
+            kept.filter(|path| path.file_name().unwrap().to_str().unwrap().starts_with(&begins)).collect();
+        own.sort();
+        own.iter().map(|path| fs::read(path).unwrap()).collect()
+    }
+}
+
+#[test]
+fn a_job_that_names_no_sheet_is_printed_on_the_loaded_one() {
+    let running = Running::start(Limits::default(), true);
+    let load = |paper: Paper, kind: &str| {
+        running.server.load(Loaded { size: size(paper), kind: kind.into() }).unwrap();
+    };
+    let mut picture = std::io::Cursor::new(Vec::new());
+    image::RgbImage::from_pixel(40, 40, image::Rgb([0; 3]))
+        .write_to(&mut picture, image::ImageFormat::Png)
+        .unwrap();
+    let printed = |asked: &[Attribute<'_>]| {
+        let job = running.print(asked, picture.get_ref(), State::Completed);
+        let [sheet] = &running.sheets_of(&job)[..] else { panic!("not one sheet") };
+        let setup = inspect(sheet, &Silent).inspection.setup;
+        (job.id, setup.paper.unwrap(), setup.curl_correction.unwrap())
+    };
+    load(Paper::Postcard, "film");
+    let (job, paper, curl) = printed(&[]);
+    assert_eq!((paper, curl), ("postcard", false));
+    assert_eq!(printed(&[(0x44, "media-type", b"stationery")]).1, "postcard");
+    // What a job names goes before what is loaded; what the preset says is a type, too.
+    let (_, paper, curl) = printed(&[(0x44, "media", b"iso_a4_210x297mm"), (0x44, "media-type", b"auto")]);
+    assert_eq!((paper, curl), ("a4", true));
+    // Another sheet changes nothing of a job that is printed.
+    load(Paper::A4, AUTO);
+    assert!(running.asked(ipp::JOB, job).contains("media\0\u{14}jpn_hagaki_100x148mm"));
+    assert_eq!(printed(&[]).1, "a4");
+}
