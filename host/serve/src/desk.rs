@@ -138,6 +138,7 @@ async fn upload(
         Ok(id) => id,
         Err(error) => return words(StatusCode::SERVICE_UNAVAILABLE, &with_causes(&error)),
     };
+    let _receives = server.receives(id);
     let Ok(kept) = keep(body, &[], &server.store.folder(id), Packing::None, limits).await else {
         tokio::task::block_in_place(|| server.forget(id));
         let Gone = Gone;

@@ -410,6 +410,7 @@ async fn ipp(server: &Server, mut body: Incoming, place: &Place, limits: &Limits
         }
     };
     let folder = server.store.folder(incoming.job);
+    let _receives = server.receives(incoming.job);
     let Ok(spooled) = keep(&mut body, &rest, &folder, incoming.packing, limits).await else {
         block_in_place(|| operations::gone(server, &incoming));
         return late();

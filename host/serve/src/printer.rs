@@ -331,5 +331,5 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
     ]
 }
 
-/// Seconds that the document of a job may take to come.
+/// Seconds until the document of a job has to begin to come, from the last operation of that job.
 pub const TIME_OUT: i32 = 120;

@@ -96,6 +96,8 @@ pub struct Data {
     /// All jobs that are known.
     pub jobs: BTreeMap<u32, Job>,
     next: u32,
+    /// When the last operation of a job without its document ended; none while its document comes.
+    heard: BTreeMap<u32, Option<u64>>,
     /// Why the device does not print, or soon will not.
     pub reasons: Vec<Reason>,
     /// What it does, for people.
@@ -221,6 +223,7 @@ impl Server {
         let data = Data {
             next: jobs.keys().next_back().map_or(1, |last| last + 1),
             jobs,
+            heard: BTreeMap::new(),
             reasons: Vec::new(),
             message: String::new(),
             percent: None,
@@ -331,6 +334,18 @@ impl Server {
         drop(data);
         self.wake.notify_all();
         Ok(done)
+    }
+
+    /// A job's document comes, until what is given back is dropped. Time runs out between operations; each has limits of its own.
+    pub fn receives(&self, id: u32) -> impl Drop + use<'_> {
+        struct Receives<'a>(&'a Server, u32);
+        impl Drop for Receives<'_> {
+            fn drop(&mut self) {
+                self.0.data().heard.insert(self.1, Some(now()));
+            }
+        }
+        self.data().heard.insert(id, None);
+        Receives(self, id)
     }
 
     /// A job's document is here: it waits for its turn, or until it is released.
@@ -468,12 +483,16 @@ impl Server {
         }
     }
 
-    /// Ends jobs whose document has not come within this time.
+    /// Ends jobs whose document has not begun to come within this time.
     pub fn time_out(&self, seconds: u64) {
         let late: Vec<u32> = {
-            let data = self.data();
-            let late = |job: &&Job| job.state == State::Incoming && job.created + seconds < now();
-            data.jobs.values().filter(late).map(|job| job.id).collect()
+            let mut data = self.data();
+            let Data { jobs, heard, .. } = &mut *data;
+            heard.retain(|id, _| jobs.get(id).is_some_and(|job| job.state == State::Incoming));
+            let last = |job: &Job| heard.get(&job.id).copied().unwrap_or(Some(job.created));
+            let late = |job: &&Job| last(job).is_some_and(|last| last + seconds < now());
+            let incoming = jobs.values().filter(|job| job.state == State::Incoming);
+            incoming.filter(late).map(|job| job.id).collect()
         };
         for id in late {
             let ended = self.change(id, |job| {

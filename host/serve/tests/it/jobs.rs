@@ -1,6 +1,8 @@
 //! What becomes of jobs: on which sheet, which pages of them, and what is told of one that waits for somebody.
 
 use std::fs;
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 use observe::Silent;
@@ -13,6 +15,9 @@ use serve::template::{AUTO, size};
 use testing::ipp::{self, Attribute};
 
 use super::Running;
+use super::limits::sheet;
+
+const CREATE: u16 = 5;
 
 impl Running {
     fn job(&self, id: u32) -> Job {
@@ -85,4 +90,35 @@ fn a_job_that_names_no_sheet_is_printed_on_the_loaded_one() {
     load(Paper::A4, AUTO);
     assert!(running.asked(ipp::JOB, job).contains("media\0\u{14}jpn_hagaki_100x148mm"));
     assert_eq!(printed(&[]).1, "a4");
+}
+
+#[test]
+fn a_document_may_take_longer_to_arrive_than_to_be_awaited() {
+    let running = Running::start(Limits::default(), true);
+    let uri = format!("ipp://{}/ipp/print", running.address);
+    let message = [ipp::request(ipp::PRINT, &uri, &[], &[]), sheet()].concat();
+    let mut stream = TcpStream::connect(running.address).unwrap();
+    let head = format!(
+        "POST /ipp/print HTTP/1.1\r\nHost: {}\r\nContent-Type: application/ipp\r\nContent-Length: {}\r\nConnection: close\r\n\r\n",
+        running.address,
+        message.len()
+    );
+    stream.write_all(head.as_bytes()).unwrap();
+    stream.write_all(&message[..message.len() - 100]).unwrap();
+    // Another one's document does not begin to come.
+    ipp::ask(running.address, &ipp::request(CREATE, &uri, &[], &[])).unwrap();
+    let start = Instant::now();
+    while running.server.data().jobs.len() < 2 {
+        assert!(start.elapsed() < Duration::from_secs(60));
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    std::thread::sleep(Duration::from_millis(2100));
+    running.server.time_out(0);
+    let mut states: Vec<State> = running.server.data().jobs.values().map(|job| job.state).collect();
+    states.sort_by_key(|state| state.is_over());
+    assert_eq!(states, [State::Incoming, State::Aborted]);
+    stream.write_all(&message[message.len() - 100..]).unwrap();
+    let mut answer = Vec::new();
+    stream.read_to_end(&mut answer).unwrap();
+    running.wait(ipp::number(&answer, "job-id").unwrap() as u32, State::Completed);
 }
