@@ -25,7 +25,7 @@ use protocol::ink::Ink;
 use protocol::paper::Paper;
 use tempfile::NamedTempFile;
 
-use super::options::{Choices, NoChoice, Spots};
+use super::options::{Choices, NoChoice, Spots, is_chosen};
 use super::raster::{self, RasterError};
 use art::Page;
 use art::pdf::{Interpreter, Survey};
@@ -74,6 +74,9 @@ pub enum FilterError {
     /// No page, as of a damaged or encrypted document.
     #[error("the document cannot be printed: {0}")]
     NoPage(String),
+    /// Pages were chosen that it does not have; how many it has.
+    #[error("there is nothing to print: the pages of the document are 1 to {0}, and none of them was chosen")]
+    NotChosen(usize),
     /// Raster pages.
     #[error(transparent)]
     Raster(#[from] RasterError),
@@ -175,7 +178,7 @@ pub fn run(
         io::ErrorKind::UnexpectedEof => FilterError::Empty,
         _ => io_error("read the document")(error),
     })?;
-    let mut press = Press { choices, library, out, observer, jobs: 0, white: 0, in_margins: None };
+    let mut press = Press { choices, library, out, observer, pages: 0, jobs: 0, white: 0, in_margins: None };
     if head == raster::SYNC {
         pictures(raster::Reader::behind_sync(BufReader::with_capacity(1 << 16, document)), &mut press)?;
     } else if raster::APPLE.starts_with(&head) {
@@ -204,6 +207,9 @@ pub fn run(
     press.without_white();
     match press.in_margins {
         Some((page, beyond)) if press.jobs == 0 => Err(FilterError::Margins { page, beyond }),
+        None if press.pages > 0 && !(1..=press.pages).any(|page| is_chosen(&choices.pages, page)) => {
+            Err(FilterError::NotChosen(press.pages))
+        }
         _ => Ok(press.jobs),
     }
 }
@@ -467,6 +473,20 @@ mod tests {
         );
         assert_eq!(pass.dots, 400 * 300);
         assert!(notes.iter().any(|note| note.contains("page 2 is blank")), "{notes:?}");
+    }
+
+    #[test]
+    fn pages_that_the_document_does_not_have_are_not_called_blank() {
+        let usual = Choices::read(&[], None).unwrap();
+        let pages =
+            [raster(300, &[[500, 250, 700, 400]]), raster(300, &[[500, 250, 700, 400]])[4..].to_vec()];
+        let chosen = |pages: &[u8], chosen| {
+            let choices = Choices { pages: vec![chosen], ..usual.clone() };
+            run(io::Cursor::new(pages), None, &choices, &Library::builtin(), &mut Vec::new(), &Silent)
+        };
+        assert!(matches!(chosen(&pages.concat(), 3..=9), Err(FilterError::NotChosen(2))));
+        assert!(matches!(chosen(&pages.concat(), 2..=9), Ok(1)));
+        assert!(matches!(chosen(b"\x89PNG\r\n", 2..=2), Err(FilterError::NotChosen(1))));
     }
 
     #[test]

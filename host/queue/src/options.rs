@@ -109,6 +109,11 @@ pub struct Choices {
     pub more: art::Settings,
 }
 
+/// Whether a page, from 1, is among those to print.
+pub fn is_chosen(pages: &[RangeInclusive<usize>], page: usize) -> bool {
+    pages.is_empty() || pages.iter().any(|range| range.contains(&page))
+}
+
 const INKS: [(&str, &str); 3] = [
     ("Colour", "Cyan, magenta, yellow, black"),
     ("Black", "Black only"),

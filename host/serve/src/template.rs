@@ -7,6 +7,8 @@
 //! Limits: a sheet has one side and no finishings, and is printed upright.
 //! Source: RFC 8011, section 5.2; PWG 5100.3, 5100.7 and 5101.1.
 
+use std::ops::RangeInclusive;
+
 use ipp::value::IppValue;
 use protocol::paper::Paper;
 use protocol::rgl::Media;
@@ -291,6 +293,12 @@ impl Ticket {
         Ticket { size: self.size.or(Some(loaded.size)), kind, ..self }
     }
 
+    /// Pages to print, from 1; all if none is named.
+    pub fn pages(&self) -> Vec<RangeInclusive<usize>> {
+        let page = |number: i32| usize::try_from(number).unwrap_or(usize::MAX);
+        self.pages.iter().map(|&(from, to)| page(from)..=page(to)).collect()
+    }
+
     /// What a preset's printer draws for this job.
     pub fn choices(&self, preset: &Choices) -> Choices {
         let mut choices = preset.clone();
@@ -310,8 +318,7 @@ impl Ticket {
         if self.colour.as_deref() == Some("monochrome") {
             choices.colours = InkSet::of([Ink::Black]);
         }
-        let page = |number: i32| usize::try_from(number).unwrap_or(usize::MAX);
-        choices.pages = self.pages.iter().map(|&(from, to)| page(from)..=page(to)).collect();
+        choices.pages = self.pages();
         if let Some(paper) = self.size.and_then(paper) {
             choices.paper = paper;
         }

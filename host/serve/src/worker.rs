@@ -26,8 +26,9 @@ use crate::values::now;
 use device::questions::status::Status;
 use queue::backend::{self, Sheets};
 use queue::call::{Call, Exit};
-use queue::filter;
+use queue::filter::{self, FilterError};
 use queue::messages::{Reason, Report, colour};
+use queue::options::is_chosen;
 
 /// Prints one job after the other, for ever.
 pub fn work(server: &Server) -> ! {
@@ -147,7 +148,11 @@ fn draw(server: &Server, job: &Job, voice: &Voice<'_>) -> Result<(), String> {
     let mut out = SheetFiles { folder: &to, count: 0, voice };
     if job.format == JOB {
         let bytes = fs::read(&path).map_err(text)?;
-        for place in sheets(&bytes) {
+        let (all, pages) = (sheets(&bytes), job.ticket.pages());
+        if !(1..=all.len()).any(|page| is_chosen(&pages, page)) {
+            return Err(FilterError::NotChosen(all.len()).to_string());
+        }
+        for (_, place) in (1..).zip(all).filter(|(page, _)| is_chosen(&pages, *page)) {
             out.write_all(&bytes[place]).map_err(text)?;
         }
     } else {

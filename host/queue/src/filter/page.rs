@@ -8,7 +8,7 @@ use protocol::ink::{Ink, Kind};
 use protocol::paper::Paper;
 
 use super::{FilterError, io_error};
-use crate::options::{Choices, Place, Spots};
+use crate::options::{Choices, Place, Spots, is_chosen};
 use crate::ppd;
 use art::{Artwork, Room, Window};
 use observe::Observer;
@@ -23,6 +23,8 @@ pub(super) struct Press<'a> {
     pub library: &'a Library,
     pub out: &'a mut dyn Write,
     pub observer: &'a dyn Observer,
+    /// Pages seen.
+    pub pages: usize,
     /// Jobs written.
     pub jobs: usize,
     /// Pages on which something is white.
@@ -105,8 +107,8 @@ impl Press<'_> {
         drawn: Option<Window>,
         mirrored: bool,
     ) -> Result<Option<View>, FilterError> {
-        let pages = &self.choices.pages;
-        if !pages.is_empty() && !pages.iter().any(|range| range.contains(&number)) {
+        self.pages = number;
+        if !is_chosen(&self.choices.pages, number) {
             return Ok(None);
         }
         let Some(drawn) = drawn else {
@@ -135,6 +137,10 @@ impl Press<'_> {
 
     /// The job of a picture that has no page of its own: in the middle of the sheet, as large as it says or as fits.
     pub(super) fn picture(&mut self, path: &Path) -> Result<Vec<u8>, FilterError> {
+        self.pages = 1;
+        if !is_chosen(&self.choices.pages, 1) {
+            return Ok(Vec::new());
+        }
         let layout = Layout { cut: true, ..Layout::centred(self.choices.paper) };
         let (width, length) = layout.largest();
         let room = Room { width, length, cut: true };

@@ -15,7 +15,7 @@ use serve::template::{AUTO, size};
 use testing::ipp::{self, Attribute};
 
 use super::Running;
-use super::limits::sheet;
+use super::limits::{row, sheet};
 
 const CREATE: u16 = 5;
 
@@ -90,6 +90,17 @@ fn a_job_that_names_no_sheet_is_printed_on_the_loaded_one() {
     load(Paper::A4, AUTO);
     assert!(running.asked(ipp::JOB, job).contains("media\0\u{14}jpn_hagaki_100x148mm"));
     assert_eq!(printed(&[]).1, "a4");
+}
+
+#[test]
+fn of_finished_sheets_those_are_printed_that_were_chosen() {
+    let running = Running::start(Limits::default(), true);
+    let sheets = [row(1), row(2), row(3)];
+    let range = |from: i32, to: i32| [from.to_be_bytes(), to.to_be_bytes()].concat();
+    let job = running.print(&[(0x33, "page-ranges", &range(2, 9))], &sheets.concat(), State::Completed);
+    assert!(running.sheets_of(&job) == sheets[1..]);
+    let job = running.print(&[(0x33, "page-ranges", &range(7, 9))], &sheets.concat(), State::Aborted);
+    assert!(job.message.contains("the pages of the document are 1 to 3"), "{}", job.message);
 }
 
 #[test]

@@ -14,9 +14,14 @@ const GET_PRINTER: u16 = 11;
 
 /// A finished job of one sheet.
 pub fn sheet() -> Vec<u8> {
+    row(0x55)
+}
+
+/// A finished job of one sheet whose bytes of dots are these.
+pub fn row(dots: u8) -> Vec<u8> {
     use press::job::stream::write_job;
     use protocol::{ink::Ink, paper::Paper, rgl::Page};
-    let plane = sheet::Plane { width: 800, length: 400, stride: 100, bits: vec![0x55; 100 * 400] };
+    let plane = sheet::Plane { width: 800, length: 400, stride: 100, bits: vec![dots; 100 * 400] };
     let pass = press::separate::Pass { ink: Ink::Black, plane };
     let mut bytes = Vec::new();
     let page = Page::plain(Paper::Custom { width: 800, length: 400 });
