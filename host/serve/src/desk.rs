@@ -277,10 +277,11 @@ fn describe(server: &Server) -> Value {
         "types": types,
         "loaded": { "size": keyword_of(loaded.size), "kind": loaded.kind },
         "state": {
-            "message": data.message,
-            "reasons": data.reasons.iter().map(|reason| reason.keyword()).collect::<Vec<_>>(),
+            "message": data.said(),
+            "reasons": data.keywords(),
             "percent": data.percent,
             "prints": data.current().map(|job| job.id),
+            "is_stopped": data.stopped().is_some(),
             "wants_cartridge": wanted,
         },
         "cartridges": data.cartridges,

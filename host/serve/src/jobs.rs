@@ -225,7 +225,10 @@ pub fn after_restart(job: &mut Job, now: u64) {
             (job.state, job.ended) = (State::Aborted, Some(now));
             job.message = "the server ended before the document was here; print it again".into();
         }
-        State::Processing => job.state = State::Pending,
+        State::Processing => {
+            job.state = State::Pending;
+            job.message.clear();
+        }
         _ => {}
     }
 }

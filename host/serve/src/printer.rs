@@ -107,11 +107,14 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
     let up = server.started.elapsed().as_secs() + 1;
     let began = crate::values::now().saturating_sub(up);
     let is_printing = data.current().is_some();
-    let is_stopped = is_printing && data.reasons.iter().any(|&reason| reason != Reason::SupplyMissing);
+    let is_stopped = match is_printing {
+        true => data.reasons.iter().any(|&reason| reason != Reason::SupplyMissing),
+        false => data.stopped().is_some(),
+    };
     let state = if is_stopped { 5 } else { 3 + i32::from(is_printing) };
-    let reasons = match data.reasons.is_empty() {
-        true => keyword("none"),
-        false => keywords(data.reasons.iter().map(|reason| reason.keyword())),
+    let reasons = match data.keywords() {
+        none if none.is_empty() => keyword("none"),
+        some => keywords(some),
     };
     let queued = data.jobs.values().filter(|job| !job.state.is_over() && job.printer == preset.name).count();
     let names: Vec<String> = SHEETS.iter().map(|(keyword, _)| (*keyword).into()).collect();
@@ -218,7 +221,7 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
         (D, "printer-state", IppValue::Enum(state)),
         (D, "printer-state-change-date-time", date_time(data.changed)),
         (D, "printer-state-change-time", integer(data.changed.saturating_sub(began))),
-        (D, "printer-state-message", text(&data.message)),
+        (D, "printer-state-message", long_text(&data.said())),
         (D, "printer-state-reasons", reasons),
         (D, "printer-supply", list(supplies.clone().map(|(index, found)| octets(&supply(index, found))))),
         (D, "printer-supply-description", list(supplies.map(|(_, found)| text(&found.name)))),

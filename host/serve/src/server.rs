@@ -126,6 +126,29 @@ impl Data {
         self.jobs.values().find(|job| job.state == State::Processing)
     }
 
+    /// A job that has stopped until somebody does what its message says, and releases it.
+    pub fn stopped(&self) -> Option<&Job> {
+        self.jobs.values().find(|job| job.state == State::Held && !job.ticket.held)
+    }
+
+    /// Why the device does not print, or soon will not, as keywords. While another job is printed, one that has stopped is a warning.
+    pub fn keywords(&self) -> Vec<&'static str> {
+        let mut all: Vec<&str> = self.reasons.iter().map(|reason| reason.keyword()).collect();
+        let word = if self.current().is_some() { "other-warning" } else { "other-error" };
+        if self.stopped().is_some() && !all.contains(&word) {
+            all.push(word);
+        }
+        all
+    }
+
+    /// What it does or waits for, for people.
+    pub fn said(&self) -> String {
+        match (self.current(), self.stopped()) {
+            (None, Some(job)) => format!("job {}: {}", job.id, job.message),
+            _ => self.message.clone(),
+        }
+    }
+
     /// Jobs that are not over.
     pub fn open(&self) -> usize {
         self.jobs.values().filter(|job| !job.state.is_over()).count()
@@ -411,7 +434,7 @@ impl Server {
         self.change(id, |job| match job.state {
             State::Held => Ok(()),
             State::Pending if !job.cancel && !self.is_open(job) => {
-                job.state = State::Held;
+                (job.state, job.ticket.held) = (State::Held, true);
                 Ok(())
             }
             State::Incoming => {
@@ -429,7 +452,8 @@ impl Server {
     pub fn release(&self, id: u32) -> Result<(), ChangeError> {
         self.change(id, |job| match job.state {
             State::Held => {
-                job.state = State::Pending;
+                (job.state, job.ticket.held) = (State::Pending, false);
+                job.message.clear();
                 Ok(())
             }
             State::Incoming if job.ticket.held => {

@@ -38,6 +38,8 @@ pub fn work(server: &Server) -> ! {
         {
             let mut data = server.data();
             data.percent = None;
+            data.message.clear();
+            data.reasons.clear();
             data.changed = now();
         }
         if let Err(error) = ended {
@@ -82,7 +84,7 @@ fn print(server: &Server, job: &Job) -> Result<(), ChangeError> {
         }
         // Somebody has to do something first, and says so by releasing the job.
         Exit::Failed | Exit::Hold | Exit::Stop => server.change(job.id, |job| {
-            job.state = if job.cancel { State::Canceled } else { State::Held };
+            (job.state, job.ticket.held) = (if job.cancel { State::Canceled } else { State::Held }, false);
             job.ended = job.cancel.then(now);
             Ok(())
         }),
@@ -96,7 +98,6 @@ fn end(server: &Server, call: &Call, voice: &Voice<'_>, state: State, why: &str)
         job.message = why.into();
         Ok(())
     })?;
-    voice.reasons(&[]);
     // What is still open, as at a bridge that is another one now, is ended before the next job there.
     if !backend::is_open(&call.to, &call.journal.join(&call.identity)) {
         backend::forget(call, voice);

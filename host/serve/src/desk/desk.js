@@ -66,7 +66,8 @@ function slots(found) {
 function show(about) {
   const { state } = about;
   const reasons = state.reasons.filter((reason) => reason !== "none").join(", ");
-  at("now").textContent = [state.prints ? `Job ${state.prints}` : "Ready", state.message, reasons].filter(Boolean).join(". ");
+  const ready = state.is_stopped ? "Stopped" : "Ready";
+  at("now").textContent = [state.prints ? `Job ${state.prints}` : ready, state.message, reasons].filter(Boolean).join(". ");
   at("progress").hidden = state.percent === null;
   if (state.percent !== null) at("progress").value = state.percent;
   slots(about.cartridges);

@@ -10,7 +10,7 @@ use crate::printer;
 use crate::server::{Data, Server};
 use crate::template::{AUTO, keyword_of};
 use crate::values::{
-    date_time, each, integer, keyword, keywords, list, name, now, range, read_text, text, uri,
+    date_time, each, integer, keyword, keywords, list, long_text, name, now, range, read_text, uri,
 };
 use crate::wire::Request;
 use queue::messages::Reason;
@@ -55,8 +55,8 @@ fn stops(reason: Reason) -> bool {
 pub fn state(data: &Data, job: &Job) -> (i32, Vec<&'static str>) {
     match job.state {
         State::Incoming => (4, vec!["job-incoming"]),
-        State::Held if job.ticket.held && job.begun.is_none() => (4, vec!["job-hold-until-specified"]),
-        State::Held => (4, vec!["job-held-on-create"]),
+        State::Held if job.ticket.held => (4, vec!["job-hold-until-specified"]),
+        State::Held => (4, vec!["resources-are-not-ready"]),
         State::Processing | State::Pending if job.cancel => (5, vec!["processing-to-stop-point"]),
         State::Pending => (3, vec!["none"]),
         State::Processing if data.reasons.iter().any(|&reason| stops(reason)) => {
@@ -101,7 +101,7 @@ pub fn attributes(
         ("job-originating-user-name", name(&job.owner.user)),
         ("job-state", IppValue::Enum(number)),
         ("job-state-reasons", keywords(reasons)),
-        ("job-state-message", text(&job.message)),
+        ("job-state-message", long_text(&job.message)),
         ("number-of-documents", integer(i32::from(job.document.is_some()))),
         ("document-format-supplied", crate::values::mime(&job.format)),
         ("job-k-octets", integer(job.octets.div_ceil(1024))),

@@ -18,6 +18,7 @@ use super::Running;
 use super::limits::{row, sheet};
 
 const CREATE: u16 = 5;
+const PRINTER: u16 = 11;
 
 impl Running {
     fn job(&self, id: u32) -> Job {
@@ -101,6 +102,39 @@ fn of_finished_sheets_those_are_printed_that_were_chosen() {
     assert!(running.sheets_of(&job) == sheets[1..]);
     let job = running.print(&[(0x33, "page-ranges", &range(7, 9))], &sheets.concat(), State::Aborted);
     assert!(job.message.contains("the pages of the document are 1 to 3"), "{}", job.message);
+}
+
+#[test]
+fn a_job_that_waits_for_somebody_stops_the_printer_and_says_all_that_is_to_be_done() {
+    let running = Running::start(Limits::default(), true);
+    // No folder for sheets can be where a file is.
+    fs::write(running.path("sheets"), "").unwrap();
+    let job = running.print(&[], &sheet(), State::Held);
+    assert!(job.message.starts_with("cannot write"), "{}", job.message);
+    let words = format!("{} and so on, at length", "x".repeat(300));
+    let said = running.server.change(job.id, |job| {
+        job.message = words.clone();
+        Ok(())
+    });
+    said.unwrap();
+    let about = running.asked(ipp::JOB, job.id);
+    assert!(about.contains(&words) && about.contains("resources-are-not-ready"), "{about}");
+    let printer = running.asked(PRINTER, 0);
+    assert!(printer.contains(&words) && printer.contains("other-error"), "{printer}");
+    assert!(printer.contains("printer-state\0\u{4}\0\0\0\u{5}"), "{printer}");
+    // Whoever holds a job of theirs is not told that something is the matter.
+    let running = [running, Running::start(Limits::default(), false)];
+    let own = running[1].print(&[], &sheet(), State::Pending);
+    running[1].server.hold(own.id).unwrap();
+    assert!(running[1].asked(ipp::JOB, own.id).contains("job-hold-until-specified"));
+    assert!(running[1].asked(PRINTER, 0).contains("printer-state\0\u{4}\0\0\0\u{3}"));
+    // Nothing is said any more of what was done.
+    fs::remove_file(running[0].path("sheets")).unwrap();
+    running[0].server.release(job.id).unwrap();
+    assert!(!running[0].asked(ipp::JOB, job.id).contains(&words));
+    running[0].wait(job.id, State::Completed);
+    let printer = running[0].asked(PRINTER, 0);
+    assert!(!printer.contains("other-") && !printer.contains(&words), "{printer}");
 }
 
 #[test]
