@@ -3,25 +3,24 @@
 //! Method: one lock over all that changes. Whoever changes a job has it on disk before the lock is given back, so nobody is ever told of
 //! a state that a restart would undo. One thread prints ([`crate::worker`]); it is woken when there is something to do.
 
+mod data;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use files::durable::{self, Access};
-use inks::Library;
-use serde::{Deserialize, Serialize};
-use sha2::{Digest as _, Sha256};
-
+pub use self::data::{Cartridge, Data, Loaded, identities, identity};
+use self::data::{Kept, keep, kept};
 use crate::jobs::{Job, Owner, State, Store, StoreError, after_restart};
-use crate::template::{Size, TYPES, Ticket, paper, size};
+use crate::template::{TYPES, Ticket, paper};
 use crate::values::now;
 use device::connection::Destination;
 use device::printers::Printers;
+use files::durable::{self, Access};
+use inks::Library;
 use observe::Observer;
-use protocol::paper::Paper;
 use queue::backend;
-use queue::messages::Reason;
 use queue::options::Choices;
 
 /// The most jobs that wait.
@@ -60,98 +59,6 @@ impl Settings {
     /// The name of this computer, without a domain.
     pub fn computer(&self) -> &str {
         self.hosts.first().map_or("localhost", |name| name.split('.').next().unwrap_or(name))
-    }
-}
-
-/// What a cartridge says of itself.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
-pub struct Cartridge {
-    /// Its ink.
-    pub name: String,
-    /// How it looks in a dialog.
-    pub colour: &'static str,
-    /// Whether there is ribbon.
-    pub is_loaded: bool,
-}
-
-/// The sheet that is in the printer, as somebody has said.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
-pub struct Loaded {
-    /// Its size.
-    pub size: Size,
-    /// What it is made of; [`crate::template::AUTO`] for what the preset says.
-    pub kind: String,
-}
-
-/// What outlives the process beside jobs.
-#[derive(Clone, Serialize, Deserialize)]
-struct Kept {
-    /// Makes the identities of printers this computer's own.
-    seed: String,
-    loaded: Loaded,
-}
-
-/// What changes.
-pub struct Data {
-    /// All jobs that are known.
-    pub jobs: BTreeMap<u32, Job>,
-    next: u32,
-    /// When the last operation of a job without its document ended; none while its document comes.
-    heard: BTreeMap<u32, Option<u64>>,
-    /// Why the device does not print, or soon will not.
-    pub reasons: Vec<Reason>,
-    /// What it does, for people.
-    pub message: String,
-    /// Percent of the sheet that is on its way.
-    pub percent: Option<u64>,
-    /// The cartridges it has found; none before it was asked.
-    pub cartridges: Vec<Cartridge>,
-    kept: Kept,
-    /// When any of this changed, in seconds since 1970.
-    pub changed: u64,
-    /// When the sheet changed.
-    pub configured: u64,
-    /// Somebody wants to see which printer this is.
-    pub identify: u64,
-}
-
-impl Data {
-    /// The sheet that is loaded.
-    pub fn loaded(&self) -> &Loaded {
-        &self.kept.loaded
-    }
-
-    /// The job that is printed now.
-    pub fn current(&self) -> Option<&Job> {
-        self.jobs.values().find(|job| job.state == State::Processing)
-    }
-
-    /// A job that has stopped until somebody does what its message says, and releases it.
-    pub fn stopped(&self) -> Option<&Job> {
-        self.jobs.values().find(|job| job.state == State::Held && !job.ticket.held)
-    }
-
-    /// Why the device does not print, or soon will not, as keywords. While another job is printed, one that has stopped is a warning.
-    pub fn keywords(&self) -> Vec<&'static str> {
-        let mut all: Vec<&str> = self.reasons.iter().map(|reason| reason.keyword()).collect();
-        let word = if self.current().is_some() { "other-warning" } else { "other-error" };
-        if self.stopped().is_some() && !all.contains(&word) {
-            all.push(word);
-        }
-        all
-    }
-
-    /// What it does or waits for, for people.
-    pub fn said(&self) -> String {
-        match (self.current(), self.stopped()) {
-            (None, Some(job)) => format!("job {}: {}", job.id, job.message),
-            _ => self.message.clone(),
-        }
-    }
-
-    /// Jobs that are not over.
-    pub fn open(&self) -> usize {
-        self.jobs.values().filter(|job| !job.state.is_over()).count()
     }
 }
 
@@ -528,52 +435,4 @@ impl Server {
             let _ = ended.and_then(|()| Ok(self.store.clear(id, false)?));
         }
     }
-}
-
-/// The identity of a printer or a job, see [`Server::uuid`].
-pub fn identity(data: &Data, of: &str) -> String {
-    uuid(&data.kept.seed, of)
-}
-
-/// The identities that printers of these names have where jobs are kept in this folder.
-///
-/// # Errors
-/// What the system says.
-pub fn identities(folder: &Path, printers: &[String]) -> std::io::Result<Vec<String>> {
-    durable::make_folder(folder, Access::Private)?;
-    let kept = kept(folder)?;
-    Ok(printers.iter().map(|name| uuid(&kept.seed, &format!("printer {name}"))).collect())
-}
-
-/// What is kept beside the jobs in a folder; made if it is not there or cannot be read.
-fn kept(folder: &Path) -> std::io::Result<Kept> {
-    let path = folder.join("server.json");
-    let kept = std::fs::read(&path).ok().and_then(|text| serde_json::from_slice::<Kept>(&text).ok());
-    if let Some(kept) = kept.filter(|kept| paper(kept.loaded.size).is_some()) {
-        return Ok(kept);
-    }
-    let mut seed = [0; 16];
-    crate::random(&mut seed)?;
-    let loaded = Loaded { size: size(Paper::A4), kind: crate::template::AUTO.into() };
-    let kept = Kept { seed: hex(&seed), loaded };
-    keep(&path, &kept)?;
-    Ok(kept)
-}
-
-fn keep(path: &Path, kept: &Kept) -> std::io::Result<()> {
-    durable::write(path, &serde_json::to_vec(kept)?, Access::Private)
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// An identity made of a seed and a name. Source: RFC 9562, version 8.
-fn uuid(seed: &str, of: &str) -> String {
-    let digest = Sha256::digest(format!("{seed}/{of}").as_bytes());
-    let mut bytes: Vec<u8> = digest.iter().copied().take(16).collect();
-    bytes[6] = bytes[6] & 0x0f | 0x80;
-    bytes[8] = bytes[8] & 0x3f | 0x80;
-    let text = hex(&bytes);
-    format!("{}-{}-{}-{}-{}", &text[..8], &text[8..12], &text[12..16], &text[16..20], &text[20..])
 }
