@@ -6,7 +6,7 @@
 //! hold, and what is drawn in it is ink, whatever its colour. Only a layer to be halftoned has tones: there dark is ink,
 //! and so it is in pictures made of pixels. A drawing has no ground. Without layers it is one picture; its edges are exact,
 //! so reserved colours are unambiguous. Nothing drawn is thinner than a dot ([`thin`]). What a drawing asks of the computer has
-//! [`bounds`]; what the renderer does not know is drawn by other means or named ([`strokes`], [`write`], [`unseen`]). Rendering
+//! [`bounds`]; what the renderer does not know is drawn by other means or named ([`styles`], [`strokes`], [`write`], [`unseen`]). Rendering
 //! has a thread of its own, because filters may take for ever, and the renderer may fail on hostile drawings.
 //! Cost: four bytes a dot while a layer is rendered, eight where it holds pictures. Limits: animations do not run; a layer
 //! may take as long as a page ([`process::limit`]). A thread cannot be stopped: one that takes too long ends with the
@@ -18,11 +18,14 @@ mod fonts;
 mod links;
 mod nodes;
 mod render;
+mod sheets;
 mod source;
 mod strokes;
+mod styles;
 mod thin;
 mod units;
 mod unseen;
+mod values;
 mod write;
 
 use std::path::{Path, PathBuf};
@@ -60,22 +63,21 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     if std::fs::metadata(path).map_err(&reading)?.len() > MOST_BYTES {
         return Err(wrong(path, format!("the drawing is larger than {} MB", MOST_BYTES >> 20)));
     }
-    let text = source::decoded(path, std::fs::read(path).map_err(&reading)?)?;
-    let (layers, cuts, notes) = looked_at(path, &parsed(path, &text)?)?;
-    observer.begin("rendering layers", layers.len().max(1) as u64);
+    let bytes = std::fs::read(path).map_err(&reading)?;
     let (steps, done) = mpsc::channel();
-    let drawing = Drawing { path: path.to_path_buf(), text, layers, cuts, notes, options: options.clone() };
+    let drawing = Drawing { path: path.to_path_buf(), options: options.clone() };
     let begun = thread::Builder::new().name(DRAWING.into()).stack_size(bounds::STACK).spawn(move || {
         // Nobody listens any more if it took too long.
-        let drawn = drawing.draw(&|| drop(steps.send(None)));
-        let _ = steps.send(Some(drawn));
+        let drawn = drawing.draw(bytes, &|step| drop(steps.send(step)));
+        let _ = steps.send(Step::Done(Box::new(drawn)));
     });
     begun.map_err(io(path, "start a thread for it"))?;
     let limit = process::limit();
     let art = loop {
         match done.recv_timeout(limit) {
-            Ok(None) => observer.advance(1),
-            Ok(Some(art)) => break art,
+            Ok(Step::Layers(count)) => observer.begin("rendering layers", count),
+            Ok(Step::Layer) => observer.advance(1),
+            Ok(Step::Done(art)) => break *art,
             Err(RecvTimeoutError::Timeout) => break Err(wrong(path, process::too_long(limit))),
             Err(RecvTimeoutError::Disconnected) => {
                 break Err(wrong(path, "the drawing cannot be rendered")
@@ -85,6 +87,20 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     };
     observer.end();
     art
+}
+
+/// How far the thread of a drawing is.
+enum Step {
+    /// It has so many layers.
+    Layers(u64),
+    /// One of them is rendered.
+    Layer,
+    Done(Box<Result<Artwork, Diagnosis>>),
+}
+
+/// The text of a drawing with the styles that count, if they are not as written, and a note on those that do not.
+fn styled(path: &Path, text: &str) -> Result<(Option<String>, Option<String>), Diagnosis> {
+    styles::resolved(path, &parsed(path, text)?, MOST_BYTES)
 }
 
 /// The layers of a drawing, what of it is for a cutter, and notes on it. What would take the renderer too long, or its stack, is an
@@ -124,19 +140,21 @@ fn parsed<'a>(path: &Path, text: &'a str) -> Result<roxmltree::Document<'a>, Dia
 /// A drawing on its way to its own thread.
 struct Drawing {
     path: PathBuf,
-    text: String,
-    layers: Vec<Layer>,
-    cuts: Cuts,
-    notes: Vec<String>,
     options: Options,
 }
 
 impl Drawing {
-    /// Renders it, and calls `advance` after each layer.
-    fn draw(self, advance: &dyn Fn()) -> Result<Artwork, Diagnosis> {
-        let Drawing { path, text, layers, cuts, mut notes, options } = self;
+    /// Renders it from the bytes of its file, and tells each step.
+    fn draw(self, bytes: Vec<u8>, tell: &dyn Fn(Step)) -> Result<Artwork, Diagnosis> {
+        let Drawing { path, options } = self;
         let path = path.as_path();
+        let mut text = source::decoded(path, bytes)?;
+        let (styled, unread) = styled(path, &text)?;
+        text = styled.unwrap_or(text);
         let document = parsed(path, &text)?;
+        let (layers, cuts, mut notes) = looked_at(path, &document)?;
+        notes.extend(unread);
+        tell(Step::Layers(layers.len().max(1) as u64));
         let root = document.root_element();
         let has = |name| root.descendants().any(|node| nodes::name(node) == Some(name));
         let text = has("text");
@@ -189,6 +207,7 @@ impl Drawing {
         }
         if layers.is_empty() {
             let drawn = renderer.parsed(&whole, Without::Nothing)?;
+            notes.extend_from_slice(&drawn.notes);
             let rgba = renderer.rendered(&drawn, scale, size)?;
             let again = |without, has: bool| match has {
                 true => renderer.rendered(&renderer.parsed(&whole, without)?, scale, size).map(Some),
@@ -209,8 +228,10 @@ impl Drawing {
             let mut only = find::only(&layers, at, toned);
             let text = write::written(root, |node| only(node).and(way(node)));
             let drawn = renderer.parsed(&text, Without::Nothing)?;
+            let new: Vec<_> = drawn.notes.iter().filter(|note| !notes.contains(note)).cloned().collect();
+            notes.extend(new);
             let rgba = renderer.rendered(&drawn, scale, size)?;
-            advance();
+            tell(Step::Layer);
             if rgba.as_chunks::<4>().0.iter().all(|pixel| pixel[3] == 0) {
                 let name = &layer.label;
                 let why = match layer.hidden {

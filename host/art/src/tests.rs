@@ -16,6 +16,7 @@ mod pictures;
 mod plates;
 mod programs;
 mod sizes;
+mod styles;
 mod thin;
 mod turned;
 

@@ -6,10 +6,8 @@
 //! other ([`MOST_DEEP`]) and how many are drawn if all clones, tiles and clips are counted ([`MOST_DRAWN`]). Before it is
 //! drawn, a walk over the renderer's own tree adds up the memory of layers, tiles and pictures that exist at the same time.
 //! Cost: a look at each element. Limits: filters may take long whatever their number; the time limit of a page ends them.
-//! What style sheets refer to counts for each element that any of their names fits.
+//! What style sheets refer to is in the styles of the elements by then ([`styles`](super::styles)).
 //! Source: `render_layer` and `render_pattern_pixmap` of resvg 0.49 for what is allocated, layers of up to 5 x 5 canvases.
-
-use std::collections::HashMap;
 
 use resvg::tiny_skia::{Rect, Transform};
 use resvg::usvg::{self, roxmltree};
@@ -92,7 +90,7 @@ struct Edges {
 
 impl Edges {
     fn of(document: &roxmltree::Document<'_>) -> Edges {
-        let (ids, rules) = (nodes::by_id(document), rules(document));
+        let ids = nodes::by_id(document);
         let count = document.descendants().next_back().map_or(0, |node| node.id().get_usize()) + 1;
         let mut of = vec![Vec::new(); count];
         for node in document.descendants().filter(Node::is_element) {
@@ -100,10 +98,7 @@ impl Edges {
             edges.extend(node.children().filter(Node::is_element).map(|child| child.id().get_usize()));
             let mut to = |id: &str| edges.extend(ids.get(id).map(|target| target.id().get_usize()));
             node.attributes().for_each(|a| urls(a.value()).for_each(&mut to));
-            nodes::reference(node).into_iter().for_each(&mut to);
-            let classes = node.attribute("class").unwrap_or_default().split_ascii_whitespace();
-            let names = classes.chain(nodes::name(node)).chain(node.attribute("id")).chain(["*"]);
-            names.filter_map(|name| rules.get(name)).flatten().copied().for_each(to);
+            nodes::reference(node).into_iter().for_each(to);
         }
         Edges { of }
     }
@@ -116,26 +111,6 @@ pub(super) fn urls(value: &str) -> impl Iterator<Item = &str> {
         let id = rest.strip_prefix('#')?;
         Some(id.split([')', '"', '\'']).next()?.trim())
     })
-}
-
-/// What the rules of style sheets refer to, by the names in their selectors.
-fn rules<'a>(document: &'a roxmltree::Document<'_>) -> HashMap<&'a str, Vec<&'a str>> {
-    let mut rules: HashMap<&str, Vec<&str>> = HashMap::new();
-    for sheet in document.descendants().filter(|node| nodes::name(*node) == Some("style")) {
-        for text in sheet.children().filter_map(|child| child.text()) {
-            for rule in text.split('}') {
-                let Some((selector, body)) = rule.rsplit_once('{') else { continue };
-                let targets: Vec<&str> = urls(body).collect();
-                if targets.is_empty() {
-                    continue;
-                }
-                let name = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '*');
-                let names = selector.split(|c| !name(c)).filter(|name| !name.is_empty());
-                names.for_each(|name| rules.entry(name).or_default().extend(&targets));
-            }
-        }
-    }
-    rules
 }
 
 /// The bytes of pixels that exist at the same time while a drawing is rendered.
@@ -232,16 +207,10 @@ mod tests {
     #[test]
     fn what_lies_too_deep_in_each_other_is_refused_however_it_is_nested() {
         type Each = fn(usize) -> String;
-        let kinds: [Each; 4] = [
+        let kinds: [Each; 3] = [
             |i| format!("<clipPath id='a{i}' clip-path='url(#a{})'/>", i + 1),
             |i| format!("<pattern id='a{i}'><rect style='fill: url( \"#a{}\" )'/></pattern>", i + 1),
             |i| format!("<mask id='a{i}'><use href='#a{}'/></mask>", i + 1),
-            |i| {
-                let to = i + 1;
-                format!(
-                    "<style>.c{i}, x {{ fill:url(#a{to}) }}</style><g id='a{i}'><rect class='b c{i}'/></g>"
-                )
-            },
         ];
         for (kind, each) in kinds.into_iter().enumerate() {
             assert_eq!(checked(&chain(200, each)), Ok(()), "{kind}");

@@ -32,6 +32,8 @@ pub(super) struct Met {
     pub pictures: bool,
     /// What is wrong with the first picture that cannot be drawn, and what to do.
     pub missing: Option<String>,
+    /// Notes on drawings within the drawing.
+    pub notes: Vec<String>,
 }
 
 /// What is wrong with pictures, by their bytes.
@@ -66,17 +68,21 @@ pub(super) fn resolver(
     let (data, in_file) =
         (ImageHrefResolver::default_data_resolver(), ImageHrefResolver::default_data_resolver());
     let (of_data, of_link, taken_link) = (met.clone(), met.clone(), taken.clone());
+    let of = path.to_owned();
     let folder = path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new(".")).to_owned();
     ImageHrefResolver {
         resolve_data: Box::new(move |mime, bytes, options| {
-            let found = drawable(&bytes).and_then(|()| data(mime, bytes, options).ok_or(UNREADABLE));
+            let found = drawable(&of, &bytes, &of_data).and_then(|drawing| {
+                let mime = if drawing.is_some() { SVG } else { mime };
+                data(mime, drawing.unwrap_or(bytes), options).ok_or(UNREADABLE)
+            });
             taken(&of_data, found, &format!("of the type `{mime}`"), "embed it as PNG")
         }),
         resolve_string: Box::new(move |href, options| {
             let found = file(&folder, href).and_then(|bytes| {
-                drawable(&bytes)?;
+                let drawing = drawable(Path::new(href), &bytes, &of_link)?.unwrap_or_else(|| Arc::new(bytes));
                 // The kind is told by the bytes.
-                in_file("text/plain", Arc::new(bytes), options).ok_or(UNREADABLE)
+                in_file("text/plain", drawing, options).ok_or(UNREADABLE)
             });
             let remedy = "put it where the drawing links it, or embed it as PNG";
             taken_link(&of_link, found, &format!("`{href}`"), remedy)
@@ -110,8 +116,12 @@ fn file(folder: &Path, href: &str) -> Result<Vec<u8>, &'static str> {
     Ok(bytes)
 }
 
-/// Checks that what may be a drawing has the bounds of one: the renderer would expand and draw it whatever it is.
-fn drawable(bytes: &[u8]) -> Result<(), &'static str> {
+/// The type of a drawing.
+const SVG: &str = "image/svg+xml";
+
+/// Checks that what may be a drawing has the bounds of one: the renderer would expand and draw it whatever it is. The result is
+/// the drawing with the styles that count, if these are not as written.
+fn drawable(path: &Path, bytes: &[u8], met: &Mutex<Met>) -> Result<Option<Arc<Vec<u8>>>, &'static str> {
     const EXPANDS: &str = "expands to more than 256 MB";
     let mut text = Cow::Borrowed(bytes);
     if bytes.starts_with(b"\x1f\x8b") {
@@ -123,9 +133,15 @@ fn drawable(bytes: &[u8]) -> Result<(), &'static str> {
         }
         text = Cow::Owned(unpacked);
     }
-    let Some(text) = source::markup(&text) else { return Ok(()) };
-    let Ok(document) = super::parsed(Path::new(""), &text) else { return Err(UNREADABLE) };
-    bounds::check(&document).map_err(|_| "is a drawing that is nested too deeply")
+    let Some(mut text) = source::markup(&text) else { return Ok(None) };
+    let Ok((styled, unread)) = super::styled(path, &text) else { return Err(UNREADABLE) };
+    met.lock().unwrap_or_else(PoisonError::into_inner).notes.extend(unread);
+    let changed = styled.is_some();
+    text = styled.unwrap_or(text);
+    let Ok(document) = super::parsed(path, &text) else { return Err(UNREADABLE) };
+    bounds::check(&document).map_err(|_| "is a drawing that is nested too deeply")?;
+    drop(document);
+    Ok(changed.then(|| Arc::new(text.into_bytes())))
 }
 
 /// Why a picture made of pixels cannot be drawn to its end; the renderer leaves it out in silence.

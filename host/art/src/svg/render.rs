@@ -42,6 +42,8 @@ pub(super) struct Drawn {
     pub tree: usvg::Tree,
     /// Whether pictures made of pixels are drawn.
     pub pictures: bool,
+    /// Notes on drawings within it.
+    pub notes: Vec<String>,
 }
 
 impl Renderer {
@@ -70,7 +72,7 @@ impl Renderer {
         let met = std::mem::take(&mut *met.lock().unwrap_or_else(PoisonError::into_inner));
         match met.missing {
             Some(problem) => Err(wrong(&self.path, problem)),
-            None => Ok(Drawn { tree, pictures: met.pictures }),
+            None => Ok(Drawn { tree, pictures: met.pictures, notes: met.notes }),
         }
     }
 

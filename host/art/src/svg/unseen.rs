@@ -3,8 +3,8 @@
 //! Problem: drawings hold more than the renderer draws: mesh gradients and hatches, clips by CSS shapes, elements of later
 //! standards. It leaves them out, and what they fill.
 //! Method: what is drawn is compared with what the renderer knows: elements where shapes are drawn, what paints, clips, masks
-//! and filters refer to, and clips that refer to nothing. Cost: a walk over the elements. Limits: what a style sheet says is
-//! seen only where it refers to an element.
+//! and filters refer to, and clips that refer to nothing. Cost: a walk over the elements. Limits: none of the properties that only
+//! other standards have is named.
 
 use std::path::Path;
 
@@ -98,12 +98,6 @@ pub(super) fn note(path: &Path, document: &Document<'_>) -> Option<String> {
                 None => {}
             }
         }
-        // Whatever refers to these paints with them; only the renderer's own are drawn.
-        let sheet = nodes::name(node) == Some("style");
-        for id in sheet.then(|| node.text()).flatten().into_iter().flat_map(urls) {
-            let target = ids.get(id).filter(|target| is_paint(**target));
-            target.into_iter().for_each(|target| add(called(*target)));
-        }
     }
     if count > found.len() {
         found.push(format!("and {} more", count - found.len()));
@@ -118,11 +112,6 @@ pub(super) fn note(path: &Path, document: &Document<'_>) -> Option<String> {
     })
 }
 
-/// Whether an element is a paint that the renderer does not know.
-fn is_paint(node: Node<'_, '_>) -> bool {
-    matches!(nodes::name(node), Some("meshgradient" | "meshGradient" | "hatch" | "solidcolor" | "solidColor"))
-}
-
 /// Whether an element is drawn where it stands in other programs only.
 fn is_unknown(node: Node<'_, '_>) -> bool {
     let name = nodes::name(node).unwrap_or_default();
@@ -131,7 +120,7 @@ fn is_unknown(node: Node<'_, '_>) -> bool {
 }
 
 /// An element as a note names it.
-fn called(node: Node<'_, '_>) -> String {
+pub(super) fn called(node: Node<'_, '_>) -> String {
     let kind = match nodes::name(node).unwrap_or_default() {
         "meshgradient" | "meshGradient" => "mesh gradient",
         "g" => "group",
@@ -159,7 +148,7 @@ mod tests {
                 "<defs><hatch id='h'/></defs><rect style='stroke:url(#h)'/><rect fill='url(#h)'/>",
                 ": hatch `h`;",
             ),
-            ("<style>.a{fill:url(#s)}</style><solidColor id='s'/><rect class='a'/>", ": solidColor `s`;"),
+            ("<solidColor id='s'/><rect style='fill:url(#s)'/>", ": solidColor `s`;"),
             ("<g><video id='v'/></g>", ": video `v`;"),
             ("<rect clip-path='circle(5px)' id='r'/>", "the clip of rect `r` by `circle(5px)`;"),
             ("<g mask='url(#gone)'/>", "the mask of group (it has no `gone`);"),

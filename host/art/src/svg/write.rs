@@ -196,7 +196,8 @@ fn decodable<'a>(name: &str, value: &'a str) -> &'a str {
     if name == "href" && damaged() { "data:image/png;base64," } else { value }
 }
 
-fn attribute(out: &mut String, prefix: &str, name: &str, value: &str) {
+/// Writes an attribute with a space before it.
+pub(super) fn attribute(out: &mut String, prefix: &str, name: &str, value: &str) {
     out.extend([" ", prefix, name, "=\""]);
     escape(out, value, true);
     out.push('"');
