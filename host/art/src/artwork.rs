@@ -53,6 +53,14 @@ impl Layer {
             Shape::Tone(tones) => tones.iter().all(|&tone| tone == 0),
         }
     }
+
+    /// The dots on which it draws something, also where it is a tint.
+    pub(super) fn drawn(&self, width: usize) -> Plane {
+        match &self.shape {
+            Shape::Solid(plane) => plane.clone(),
+            Shape::Tone(tones) => bitplane::from_bytes(width, tones, |c| c > PLAIN),
+        }
+    }
 }
 
 /// Art at 600 dpi, or at 1200 x 600.
@@ -129,12 +137,7 @@ impl Artwork {
             return;
         }
         let (layer, mut notes) = layer(scan, name, named, plate, (self.width, self.length), options);
-        match &layer.shape {
-            Shape::Solid(plane) => bitplane::add(&mut self.drawn, plane),
-            Shape::Tone(tones) => {
-                bitplane::add(&mut self.drawn, &bitplane::from_bytes(self.width, tones, |c| c > PLAIN))
-            }
-        }
+        bitplane::add(&mut self.drawn, &layer.drawn(self.width));
         self.layers.push(layer);
         self.notes.append(&mut notes);
     }

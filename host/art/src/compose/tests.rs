@@ -136,6 +136,44 @@ fn choke_takes_white_from_every_edge_and_spread_adds_it() {
 }
 
 #[test]
+fn choke_moves_the_outline_of_a_tint_and_not_its_dots() {
+    let mut tint = Artwork::blank("test", (60, 60));
+    let inside = |at: usize| (6..54).contains(&(at % 60)) && (6..54).contains(&(at / 60));
+    let tones: Vec<u8> = (0..3600).map(|at| if inside(at) { 60 } else { 0 }).collect();
+    let (ink, shape) = (Cyan, Shape::Tone(tones));
+    tint.layers.push(Layer { ink, name: "cyan".into(), place: None, shape });
+    tint.drawn = tint.layers[0].drawn(60);
+    let white = |choke: f64| {
+        let composed = composed(&tint, &with(|s| (s.white, s.choke) = (Some(White::Under), choke)));
+        assert!(composed.report.notes.iter().all(|note| !note.contains("choke")));
+        dots(&composed).iter().map(|stack| stack.contains('W')).collect::<Vec<_>>()
+    };
+    let plain = white(0.0);
+    let count = plain.iter().filter(|white| **white).count();
+    assert!((300..900).contains(&count), "{count}");
+    // The nearest dot outside is less than two away on the outer two rows, and on their corners.
+    let far = |at: usize| (8..52).contains(&(at % 60)) && (8..52).contains(&(at / 60));
+    assert!(white(2.0).iter().enumerate().all(|(at, &white)| white == (plain[at] && far(at))));
+    let spread = white(-2.0);
+    assert!((0..3600).filter(|at| inside(*at)).all(|at| spread[at] == plain[at]));
+    assert_eq!((0..3600).filter(|at| !inside(*at) && spread[*at]).count(), 4 * 48 * 2 + 4);
+}
+
+#[test]
+fn choke_tells_of_parts_that_lose_all_their_white() {
+    let rows =
+        ["##########", ".#########", "..########", "..########", ".........#", "##........", "..#....###"];
+    let art = art(&[(Black, &rows)]);
+    let said = |choke: f64| {
+        let composed = composed(&art, &with(|s| (s.white, s.choke) = (Some(White::Under), choke)));
+        composed.report.notes.into_iter().filter(|note| note.contains("lose all")).collect::<Vec<_>>()
+    };
+    // Two parts at the bottom: one that hangs together at a corner, and one of three dots.
+    assert!(said(1.0)[0].contains("0.08 mm wide lose all their white: 6 of 42 dots"), "{:?}", said(1.0));
+    assert_eq!(said(0.4).len() + said(-3.0).len(), 0);
+}
+
+#[test]
 fn finish_covers_the_art_or_all_of_it_or_nothing() {
     let art = art(&[(Black, &["#..."]), (Ink::Finish, &[".#.."])]);
     let finish = |mode| dots(&composed(&art, &with(|s| s.finish = Some(mode))));

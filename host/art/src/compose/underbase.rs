@@ -1,4 +1,6 @@
 //! White beneath the art and finish on it, as the settings say.
+//!
+//! Choke and spread move the outline of what is drawn: a tint has dots of its own, which a round brush would take one by one.
 
 use observe::Diagnosis;
 use protocol::ink::{Ink, Kind};
@@ -10,9 +12,13 @@ use super::super::{bitplane, distance};
 use super::separation::Separation;
 use super::settings::{Finish, Settings};
 use sheet::Plane;
+use sheet::forest::Forest;
 
 /// The most that white is choked or spread, in mm.
 pub const MOST_CHOKE_MM: f64 = 10.0;
+
+/// Where white comes from that the art does not draw.
+const SETTING: &str = "white setting";
 
 /// Adds white, and chokes or spreads it.
 pub(super) fn lay_white(
@@ -30,10 +36,10 @@ pub(super) fn lay_white(
             let drawn = separations.remove(at);
             bitplane::add(&mut bed, &drawn.plane);
         }
-        let from = format!("white setting: {mode}");
+        let from = format!("{SETTING}: {mode}");
         separations.push(Separation { ink: Ink::White, from, place: Some(0), plane: bed, passes: 1 });
     }
-    choke(separations, settings.choke, tell)
+    choke(separations, art, settings, tell)
 }
 
 /// The plane of white that the settings ask for, if any, and its mode.
@@ -80,8 +86,14 @@ fn white_bed(
     Ok(Some((mode, bed)))
 }
 
-/// Shrinks all white by so many dots, or spreads it if the number is negative.
-fn choke(separations: &mut [Separation], choke: f64, tell: &mut dyn FnMut(String)) -> Result<(), Diagnosis> {
+/// Moves the outline of all white inwards by so many dots, or outwards if the number is negative.
+fn choke(
+    separations: &mut [Separation],
+    art: &Artwork,
+    settings: &Settings,
+    tell: &mut dyn FnMut(String),
+) -> Result<(), Diagnosis> {
+    let choke = settings.choke;
     if choke == 0.0 {
         return Ok(());
     }
@@ -99,19 +111,94 @@ fn choke(separations: &mut [Separation], choke: f64, tell: &mut dyn FnMut(String
             radius * MM
         ));
     }
-    let mut any = false;
+    let (mut any, mut lost, mut all) = (false, 0, 0);
     for separation in separations.iter_mut().filter(|separation| separation.ink == Ink::White) {
         any = true;
-        separation.plane = if choke > 0.0 {
-            distance::shrink(&separation.plane, square)
+        let outline = outline(separation, art, settings.white);
+        if choke > 0.0 {
+            let before = separation.plane.clone();
+            bitplane::merge(&mut separation.plane, &distance::shrink(&outline, square), |white, inside| {
+                white & inside
+            });
+            all += before.dots();
+            lost += dots_of_parts_without(&separation.plane, &outline, &before);
         } else {
-            distance::grow(&separation.plane, square)
-        };
+            let mut edge = distance::grow(&outline, square);
+            bitplane::merge(&mut edge, &outline, |grown, outline| grown & !outline);
+            bitplane::add(&mut separation.plane, &edge);
+        }
+    }
+    if lost > 0 {
+        tell(format!(
+            "choke: parts of the art that are at most {:.2} mm wide lose all their white: {lost} of {all} dots; a smaller choke \
+             keeps it",
+            2.0 * radius * MM
+        ));
     }
     if !any {
         return refused(setting, "there is no white to choke or spread; choose where white goes");
     }
     Ok(())
+}
+
+/// What the outline of white encloses: all that is drawn over it, also where a tint leaves dots free.
+fn outline(white: &Separation, art: &Artwork, mode: Option<White>) -> Plane {
+    let mut outline = white.plane.clone();
+    let is_set = white.from.starts_with(SETTING);
+    for layer in
+        art.layers.iter().filter(|layer| layer.ink == Ink::White && (is_set || layer.name == white.from))
+    {
+        bitplane::add(&mut outline, &layer.drawn(art.width));
+    }
+    if is_set && mode == Some(White::Under) {
+        let mut colours = art.drawn.clone();
+        for layer in &art.layers {
+            let drawn = layer.drawn(art.width);
+            match layer.ink.kind() {
+                Kind::Finish | Kind::Primer => {
+                    bitplane::merge(&mut colours, &drawn, |all, clear| all & !clear)
+                }
+                _ => bitplane::add(&mut outline, &drawn),
+            }
+        }
+        bitplane::add(&mut outline, &colours);
+    }
+    outline
+}
+
+/// How many dots `before` has in those parts of `outline` in which `after` has none. What touches at a corner hangs together.
+fn dots_of_parts_without(after: &Plane, outline: &Plane, before: &Plane) -> u64 {
+    let (mut parts, mut found) = (Forest::default(), Vec::new());
+    let (mut above, mut row): (Vec<(usize, usize, u32)>, Vec<_>) = (Vec::new(), Vec::new());
+    for y in 0..outline.length {
+        let (mut x, mut first) = (0, 0);
+        while x < outline.width {
+            if !bitplane::at(outline, x, y) {
+                x += 1;
+                continue;
+            }
+            let from = x;
+            let (mut dots, mut is_left) = (0, false);
+            while x < outline.width && bitplane::at(outline, x, y) {
+                dots += u64::from(bitplane::at(before, x, y));
+                is_left |= bitplane::at(after, x, y);
+                x += 1;
+            }
+            let number = parts.add();
+            found.push((dots, is_left));
+            first += above[first..].iter().take_while(|(_, to, _)| *to < from).count();
+            for (_, _, other) in above[first..].iter().take_while(|(other, ..)| *other <= x) {
+                parts.join(*other, number);
+            }
+            row.push((from, x, number));
+        }
+        above.clear();
+        std::mem::swap(&mut above, &mut row);
+    }
+    let roots: Vec<usize> = (0..found.len() as u32).map(|number| parts.root(number) as usize).collect();
+    let mut left = vec![false; found.len()];
+    roots.iter().zip(&found).for_each(|(root, (_, is_left))| left[*root] |= is_left);
+    roots.iter().zip(&found).filter(|(root, _)| !left[**root]).map(|(_, (dots, _))| dots).sum()
 }
 
 fn refused<T>(setting: &'static str, problem: impl std::fmt::Display) -> Result<T, Diagnosis> {
