@@ -82,6 +82,12 @@ pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Res
                 .hint("save the picture in RGB or grey, with 8 or 16 bits a channel");
         }
         let cause = if let ImageError::IoError(cause) = &error { Some(cause) } else { None };
+        if let (Some(cause), ImageFormat::Tiff) = (cause, format)
+            && cause.kind() == ErrorKind::UnexpectedEof
+            && let Some(ended) = tiff_kinds::ended(path, &bytes)
+        {
+            return ended;
+        }
         undecodable(path, &error, cause)
     };
     if format == ImageFormat::Tiff

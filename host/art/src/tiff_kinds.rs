@@ -233,6 +233,29 @@ pub(super) fn refused(path: &Path, bytes: &[u8], error: &dyn std::fmt::Display) 
     wrong(path, problem).hint(hint)
 }
 
+/// Why a TIFF whose data end too early cannot be decoded although all of them are in the file; `None` if they are not.
+pub(super) fn ended(path: &Path, bytes: &[u8]) -> Option<Diagnosis> {
+    let mut decoder = tiff_decoder(bytes)?;
+    let about = About::of(&mut decoder)?;
+    let mut all = |tag| decoder.find_tag(tag).ok().flatten()?.into_u64_vec().ok();
+    let starts = all(Tag::TileOffsets).or_else(|| all(Tag::StripOffsets))?;
+    let lengths = all(Tag::TileByteCounts).or_else(|| all(Tag::StripByteCounts))?;
+    let is_there = |(start, length): (&u64, &u64)| start.saturating_add(*length) <= bytes.len() as u64;
+    if starts.len() != lengths.len() || !starts.iter().zip(&lengths).all(is_there) {
+        return None;
+    }
+    let kind = match about.compression {
+        1 => "uncompressed",
+        5 => "LZW",
+        JPEG => "JPEG",
+        8 | 32_946 => "ZIP",
+        32_773 => "PackBits",
+        _ => "compressed",
+    };
+    let problem = format!("its {kind} data are all there but cannot be read to their end");
+    Some(wrong(path, problem).hint("save it as PNG, or as TIFF without compression"))
+}
+
 /// The colour of JPEG's components, by JFIF.
 fn of_ycbcr([y, cb, cr]: [u8; 3]) -> [u8; 3] {
     let (y, cb, cr) = (f32::from(y), f32::from(cb) - 128.0, f32::from(cr) - 128.0);

@@ -64,6 +64,41 @@ fn a_picture_of_any_format_that_was_cut_short_says_so() {
     }
 }
 
+#[test]
+fn a_tiff_whose_data_are_there_was_not_cut_short() {
+    // Half a tile of grey in LZW: codes of nine bits, begun anew before they get longer, without the code of the end.
+    let codes = (0..500).flat_map(|at| [Some(256).filter(|_| at % 200 == 0), Some(90)]).flatten();
+    let bits: Vec<u8> =
+        codes.flat_map(|code: u16| (0..9).rev().map(move |bit| (code >> bit & 1) as u8)).collect();
+    let data: Vec<u8> = bits.chunks(8).map(|bits| bits.iter().fold(0, |all, bit| all << 1 | bit)).collect();
+    let fields: [(u16, u32); 11] = [
+        (256, 20),
+        (257, 20),
+        (258, 8),
+        (259, 5),
+        (262, 1),
+        (277, 1),
+        (284, 1),
+        (322, 32),
+        (323, 32),
+        (324, 8 + 2 + 11 * 12 + 4),
+        (325, data.len() as u32),
+    ];
+    let mut whole = b"II*\0\x08\0\0\0\x0b\0".to_vec();
+    for (tag, value) in fields {
+        whole.extend([&tag.to_le_bytes()[..], &[3, 0, 1, 0, 0, 0], &value.to_le_bytes()].concat());
+    }
+    whole.extend([&[0; 4], &data[..]].concat());
+    let bench = Bench::new();
+    let text = refused(&[bench.write("white.tif", &whole)]);
+    assert!(
+        text.contains("its LZW data are all there but cannot be read to their end; save it as PNG"),
+        "{text}"
+    );
+    let text = refused(&[bench.write("white.tif", &whole[..whole.len() - 99])]);
+    assert!(text.contains("the file was cut short"), "{text}");
+}
+
 proptest! {
     #![proptest_config(testing::cases(200))]
     #[test]
