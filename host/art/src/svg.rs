@@ -209,6 +209,12 @@ impl Drawing {
             let drawn = renderer.parsed(&whole, Without::Nothing)?;
             notes.extend_from_slice(&drawn.notes);
             let rgba = renderer.rendered(&drawn, scale, size)?;
+            if let Some(vanished) = unseen::vanished(path, &drawn.tree, scale) {
+                if is_blank(&rgba) {
+                    return Err(nothing(vanished));
+                }
+                notes.push(vanished);
+            }
             let again = |without, has: bool| match has {
                 true => renderer.rendered(&renderer.parsed(&whole, without)?, scale, size).map(Some),
                 false => Ok(None),
@@ -228,11 +234,14 @@ impl Drawing {
             let mut only = find::only(&layers, at, toned);
             let text = write::written(root, |node| only(node).and(way(node)));
             let drawn = renderer.parsed(&text, Without::Nothing)?;
-            let new: Vec<_> = drawn.notes.iter().filter(|note| !notes.contains(note)).cloned().collect();
-            notes.extend(new);
+            for note in drawn.notes.iter().cloned().chain(unseen::vanished(path, &drawn.tree, scale)) {
+                if !notes.contains(&note) {
+                    notes.push(note);
+                }
+            }
             let rgba = renderer.rendered(&drawn, scale, size)?;
             tell(Step::Layer);
-            if rgba.as_chunks::<4>().0.iter().all(|pixel| pixel[3] == 0) {
+            if is_blank(&rgba) {
                 let name = &layer.label;
                 let why = match layer.hidden {
                     true => "is hidden: left out; show it in the drawing program to print it",
@@ -268,6 +277,11 @@ impl Drawing {
         art.notes.append(&mut notes);
         Ok(art)
     }
+}
+
+/// Whether nothing is drawn.
+fn is_blank(rgba: &[u8]) -> bool {
+    rgba.as_chunks::<4>().0.iter().all(|pixel| pixel[3] == 0)
 }
 
 /// Whether a drawing may hold another, whose text needs fonts.

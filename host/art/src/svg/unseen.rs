@@ -3,12 +3,14 @@
 //! Problem: drawings hold more than the renderer draws: mesh gradients and hatches, clips by CSS shapes, elements of later
 //! standards. It leaves them out, and what they fill.
 //! Method: what is drawn is compared with what the renderer knows: elements where shapes are drawn, what paints, clips, masks
-//! and filters refer to, and clips that refer to nothing. Cost: a walk over the elements. Limits: none of the properties that only
-//! other standards have is named.
+//! and filters refer to, and clips that refer to nothing. Of the renderer's own tree, tiles of patterns are compared with a dot.
+//! Cost: a walk over the elements. Limits: patterns in clips, masks and drawings within the drawing are not looked at.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
-use resvg::usvg::roxmltree::Document;
+use resvg::tiny_skia::Transform;
+use resvg::usvg::{self, roxmltree::Document};
 
 use super::bounds::urls;
 use super::nodes::{self, Node};
@@ -110,6 +112,49 @@ pub(super) fn note(path: &Path, document: &Document<'_>) -> Option<String> {
             found.join(", ")
         )
     })
+}
+
+/// A note on patterns whose tiles are so small at this scale that the renderer has no dot for them.
+pub(super) fn vanished(path: &Path, tree: &usvg::Tree, scale: Transform) -> Option<String> {
+    let mut found = BTreeSet::new();
+    tiles(tree.root(), scale, &mut found);
+    let more = found.len().saturating_sub(LISTED);
+    let names: Vec<String> = found.into_iter().take(LISTED).map(|id| format!("`{id}`")).collect();
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    (!names.is_empty()).then(|| {
+        format!(
+            "{}: nothing is drawn with the pattern {}{more}, whose tile is smaller than a dot; make the tile larger, or use a \
+             plain colour",
+            path.display(),
+            names.join(", ")
+        )
+    })
+}
+
+/// Gathers the patterns of a group that vanish.
+fn tiles<'a>(group: &'a usvg::Group, scale: Transform, found: &mut BTreeSet<&'a str>) {
+    let scale = scale.pre_concat(group.transform());
+    for node in group.children() {
+        match node {
+            usvg::Node::Group(inner) => tiles(inner, scale, found),
+            usvg::Node::Text(text) => tiles(text.flattened(), scale, found),
+            usvg::Node::Image(_) => {}
+            usvg::Node::Path(shape) => {
+                let (fill, stroke) =
+                    (shape.fill().map(usvg::Fill::paint), shape.stroke().map(usvg::Stroke::paint));
+                for paint in [fill, stroke].into_iter().flatten() {
+                    let usvg::Paint::Pattern(pattern) = paint else { continue };
+                    let (sx, sy) = scale.pre_concat(pattern.transform()).get_scale();
+                    // The renderer rounds a tile to dots.
+                    if (pattern.rect().width() * sx).min(pattern.rect().height() * sy) < 0.5 {
+                        found.insert(pattern.id());
+                    } else {
+                        tiles(pattern.root(), Transform::from_scale(sx, sy), found);
+                    }
+                }
+            }
+        }
+    }
 }
 
 /// Whether an element is drawn where it stands in other programs only.

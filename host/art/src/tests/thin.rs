@@ -97,3 +97,31 @@ fn hairlines_in_a_picture_are_whole_too() {
         assert!((1..=2).contains(&across(&opaque, at, true)), "column {at}");
     }
 }
+
+#[test]
+fn patterns_with_tiles_smaller_than_a_dot_are_named() {
+    let bench = Bench::new();
+    let with = |tile: f64, beside: &str| {
+        let text = format!(
+            "<pattern id='p' width='{tile}' height='2' patternUnits='userSpaceOnUse'><rect width='1' height='1'/></pattern>
+            <rect width='9' height='9' fill='url(#p)'/>{beside}"
+        );
+        bench.write("a.svg", drawing(&text))
+    };
+    let alone = refused(&[with(0.02, "")]);
+    assert!(
+        alone.contains("nothing is drawn with the pattern `p`, whose tile is smaller than a dot"),
+        "{alone}"
+    );
+    let notes = |file| read(&[file], &Options::default()).notes;
+    let named = |notes: &[String]| notes.iter().filter(|note| note.contains("pattern `p`")).count();
+    assert_eq!(named(&notes(with(0.02, "<rect x='20' width='9' height='9'/>"))), 1);
+    assert_eq!(
+        named(&notes(with(
+            0.02,
+            "<g id='gold'><rect width='9' height='9' fill='url(#p)'/><rect x='20' width='9' height='9'/></g>"
+        ))),
+        1
+    );
+    assert_eq!(named(&notes(with(2.0, ""))), 0);
+}
