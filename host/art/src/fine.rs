@@ -18,6 +18,8 @@ mod figures;
 mod lean;
 mod mixtures;
 #[cfg(test)]
+mod neighbours;
+#[cfg(test)]
 mod tests;
 
 use std::ops::Range;

@@ -3,8 +3,8 @@
 //! Problem: thirty million dots each need the stack that their threshold picks from the mixture of their colour.
 //! Method: the stacks lie in order of lightness on [0, 1), the darkest first, each with its share; [`Stops`] are where they end. So
 //! a threshold picks the stack whose number is how many stops it has reached. Stops are linear in the shares: those of the nodes
-//! of the `lattice` are interpolated like mixtures. In flat colours a share below [`Rules::least`] is dropped, since it would only be specks, and the colours
-//! that are the name of a stack are that stack.
+//! of the `lattice` are interpolated like mixtures. In flat colours a share below [`Rules::least`] is dropped, since it would only be specks; the
+//! stacks next to it in lightness have it. The colours that are the name of a stack are that stack.
 //! Cost: 10 ns a colour. Limits: `N` stacks.
 
 use inks::Stack;
@@ -157,29 +157,25 @@ impl<'a, const N: usize> Mixtures<'a, N> {
 
     /// The stops of a flat colour.
     pub fn flat(&self, colour: [u8; 3], drawn: bool) -> Stops<N> {
-        let whole = shares(&self.stops(colour, drawn));
-        if whole.iter().all(|&share| share == 0 || share >= self.rules.least) {
-            return stops(&whole);
-        }
-        stops(&self.without_specks(&whole))
+        stops(&self.without_specks(shares(&self.stops(colour, drawn))))
     }
 
-    /// Such shares without those that are less than [`Rules::least`]. What they do to the lightness the others make up for: each changes in
-    /// proportion to how much lighter than their mean it is.
-    fn without_specks(&self, whole: &[u16; N]) -> [u16; N] {
-        let kept = whole.map(|share| if share < self.rules.least { 0.0 } else { f64::from(share) });
-        let mean = |shares: &[f64; N]| {
-            let sum: f64 = shares.iter().sum();
-            shares.iter().zip(&self.light).map(|(share, light)| share * light).sum::<f64>() / sum.max(1.0)
-        };
-        let (wanted, found) = (mean(&whole.map(f64::from)), mean(&kept));
-        let total: f64 = kept.iter().sum();
-        let off = |q: usize| self.light[q] - found;
-        let spread: f64 = (0..N).map(|q| kept[q] / total.max(1.0) * off(q).powi(2)).sum();
-        let tilt = if spread > 0.0 { (wanted - found) / spread } else { 0.0 };
-        let tilted: [f64; N] = std::array::from_fn(|q| kept[q] * (1.0 + tilt * off(q)).max(0.0));
-        let total: f64 = tilted.iter().sum();
-        tilted.map(|share| (share * f64::from(ONE) / total.max(1.0)) as u16)
+    /// Such shares without those that are less than [`Rules::least`], the smallest first. Each goes to the stacks next to it in lightness, a darker and
+    /// a lighter one, in the parts that keep the lightness, or to the only one. So specks of several stacks may become one share that counts, and
+    /// no share that counts shrinks.
+    fn without_specks(&self, mut shares: [u16; N]) -> [u16; N] {
+        loop {
+            let specks = (0..N).filter(|&q| (1..self.rules.least).contains(&shares[q]));
+            let Some(speck) = specks.min_by_key(|&q| shares[q]) else { return shares };
+            let has_any = |&q: &usize| shares[q] > 0;
+            let (below, above) = ((0..speck).rev().find(has_any), (speck + 1..N).find(has_any));
+            let (Some(dark), Some(pale)) = (below.or(above), above.or(below)) else { return shares };
+            let (way, up) = (self.light[pale] - self.light[dark], self.light[speck] - self.light[dark]);
+            let lost = std::mem::take(&mut shares[speck]);
+            let paler = if way > 0.0 { (f64::from(lost) * up / way).round() as u16 } else { 0 };
+            shares[pale] += paler;
+            shares[dark] += lost - paler;
+        }
     }
 
     /// The stack, in that order, that a threshold picks.
