@@ -4,8 +4,8 @@
 //! Method: 17 x 17 x 17 colours are fitted, once for each intent in use. A pixel is interpolated among the four corners of the
 //! tetrahedron around it. An interpolated mixture is a mixture, so every pixel is printable.
 //! Text and drawings name inks by the primaries of sRGB, none of which is printable as it looks. So that a tint does not differ
-//! from its solid in hue, the lines from white to the primaries, and between neighbouring primaries, are tints of those stacks
-//! ([`with_tints`]).
+//! from its solid in hue, the lines from white to the primaries, and between neighbouring primaries, are tints of those stacks. Other
+//! lattices run into these stacks at the primaries only ([`with_tints`]): colours that are nearly a primary print nearly as its solid.
 //! Cost: 60 ms for the fit, 20 ns a pixel. Limits: colours between nodes are as exact as the interpolation.
 
 use inks::Stack;
@@ -108,7 +108,7 @@ impl Nodes {
 /// How far inside the cube nodes are still tints in part. A test moves each by a fifth.
 #[derive(Clone, Copy)]
 pub(super) struct Near {
-    /// In nodes from an edge of the cube.
+    /// In nodes from an edge of the cube, or from a primary of a lattice that has no tints.
     pub edge: f64,
     /// For the lines from white, as a share of the distance from white.
     pub hue: f64,
@@ -123,7 +123,7 @@ impl Near {
 const GREY: usize = 1;
 
 /// What a colour is made of as tints: paper, a primary, and the secondary towards which its hue is turned.
-struct Tint {
+pub(super) struct Tint {
     /// Which of red, green and blue have all of their light, a bit each, and the share of each.
     parts: [(usize, f64); 3],
     /// How much of the colour is printed so, from none to 1 on the edges where no fit is wanted.
@@ -132,7 +132,7 @@ struct Tint {
 
 impl Tint {
     /// The tint nearest to a node; `None` for greys.
-    fn of(node: [usize; 3], near: Near, amount: impl Fn(f64) -> f64) -> Option<Tint> {
+    pub fn of(node: [usize; 3], near: Near, amount: impl Fn(f64) -> f64) -> Option<Tint> {
         let mut order = [(node[0], 4), (node[1], 2), (node[2], 1)];
         order.sort_by_key(|&(level, _)| std::cmp::Reverse(level));
         let [most, middle, least] = order.map(|(level, _)| level as f64);
@@ -152,18 +152,27 @@ impl Tint {
         let ink = 1.0 - paper;
         Some(Tint { parts: [(7, paper), (secondary, ink * second), (primary, ink * (1.0 - second))], part })
     }
+
+    /// The solid of a primary, of which a node near that corner has the more the nearer each of its values is.
+    pub fn of_corner(node: [usize; 3], near: Near) -> Option<Tint> {
+        let last = NODES - 1;
+        let corner = node.iter().fold(0, |bits, &level| 2 * bits + usize::from(2 * level > last));
+        let parts = node.map(|level| (1.0 - level.min(last - level) as f64 / near.edge).max(0.0));
+        // White and black are fitted, as all greys are.
+        let is_primary = corner > 0 && corner < 7;
+        is_primary.then(|| Tint { parts: [(corner, 1.0), (7, 0.0), (7, 0.0)], part: parts.iter().product() })
+    }
 }
 
 /// Prints the edges of a lattice on which no fit is wanted: from white to each of the six primaries and from cyan, magenta and
 /// yellow to the red, green and blue beside them. Along them are the two stacks that the ends name, in shares that change evenly with
 /// the `amount` of the values of red, green and blue. If that is the value itself, 30 % cyan is cyan on 30 % of the dots; if it is light, a
 /// pink with a fifth of green's and blue's light is paper on a fifth of its dots. Nodes near them are such tints in part, so that a
-/// shading that ends there has no step.
+/// shading that ends there has no step. With [`Tint::of_corner`] only the six primaries and what is near them are printed so.
 pub(super) fn with_tints(
     mix: InkMix,
     lattice: usize,
-    near: Near,
-    amount: impl Fn(f64) -> f64,
+    tint: impl Fn([usize; 3]) -> Option<Tint>,
     named: impl Fn([u8; 3]) -> Option<Stack>,
 ) -> Result<InkMix, WeightError> {
     let mut wider = Wider::new(mix);
@@ -175,7 +184,7 @@ pub(super) fn with_tints(
     wider.changed(|node, out| {
         let Some(node) = node.checked_sub(lattice * ALL).filter(|&node| node < ALL) else { return };
         let at = [node / (NODES * NODES), node / NODES % NODES, node % NODES];
-        let Some(Tint { parts, part }) = Tint::of(at, near, &amount) else { return };
+        let Some(Tint { parts, part }) = tint(at) else { return };
         let parts = parts.map(|(corner, share)| (corners[corner], share));
         if part == 0.0 || parts.iter().any(|&(corner, share)| corner.is_none() && share > 0.0) {
             return;

@@ -1,11 +1,14 @@
-//! What dropping specks does to colours: the mean of a mixture, as an eye sees it, in Oklab.
+//! Colours that are nearly one print alike: the mean of a mixture, as an eye sees it, in Oklab.
 
-use super::super::intent::{Light, difference, luminance};
+use super::super::intent::{Intent, Light, difference, luminance};
 use super::mixtures::{Rules, shares};
-use super::tests::INKS;
+use super::tests::{INKS, inks};
 use super::*;
 use appearance::weights::ONE;
 use proptest::prelude::*;
+
+/// A difference that is barely visible.
+const BARELY: f64 = 0.02;
 
 /// The mixtures of some inks and the light of each stack in their order.
 struct Eye<'a> {
@@ -70,12 +73,45 @@ fn what_is_nearly_a_corner_has_no_specks() {
     }
 }
 
+/// A step of red, green and blue is barely visible at most, in every lattice.
+#[test]
+fn what_is_nearly_a_corner_prints_like_its_neighbours() {
+    for intent in [Intent::Auto, Intent::Perceptual, Intent::Colorimetric] {
+        let inks = inks(intent);
+        let eye = Eye::new(&inks);
+        let seen = |colour, drawn| eye.mean(&eye.shares(colour, drawn)[0]);
+        let mut most = 0.0;
+        for (colour, drawn) in near_corners().flat_map(|colour| [(colour, false), (colour, true)]) {
+            let own = seen(colour, drawn);
+            for steps in 1..8 {
+                // A step from the corner in some of the three.
+                let next = std::array::from_fn(|c| match (steps >> c & 1, colour[c]) {
+                    (0, v) => v,
+                    (_, v @ ..128) => v + 1,
+                    (_, v) => v - 1,
+                });
+                let off = difference(own, seen(next, drawn));
+                most = f64::max(most, off);
+                assert!(off < BARELY, "{intent:?}, {drawn}: {colour:?} and {next:?} differ by {off}");
+            }
+        }
+        println!("{intent:?}: {most}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(20_000))]
 
     #[test]
-    fn any_colour_has_no_specks(colour: [u8; 3], drawn: bool, fifths in 4u16..=6) {
+    fn any_colour_prints_like_its_neighbours_and_has_no_specks(
+        colour: [u8; 3], c in 0usize..3, drawn: bool, fifths in 4u16..=6
+    ) {
         let mut eye = Eye::new(&INKS);
+        let mut next = colour;
+        next[c] = next[c].saturating_add(1);
+        let [own, other] = [colour, next].map(|colour| eye.mean(&eye.shares(colour, drawn)[0]));
+        let off = difference(own, other);
+        prop_assert!(off < BARELY, "{:?} and {:?} differ by {}", colour, next, off);
         eye.mixtures.rules.least = Rules::USUAL.least / 5 * fifths;
         eye.check(colour, drawn);
     }

@@ -18,17 +18,20 @@ use observe::Silent;
 use proptest::prelude::*;
 
 /// The built-in library's process inks, fitted.
-pub(super) static INKS: LazyLock<(Fit, Solids<'static>)> = LazyLock::new(|| {
+pub(super) static INKS: LazyLock<(Fit, Solids<'static>)> = LazyLock::new(|| inks(Intent::Auto));
+
+/// The same by this intent.
+pub(super) fn inks(intent: Intent) -> (Fit, Solids<'static>) {
     let space = Space::half_angle(SAMPLES);
     let process =
         InkSet::of(InkSet::default().iter().filter(|ink| ink.kind() == protocol::ink::Kind::Process));
     let printable: &'static Printable =
         Box::leak(Box::new(Printable::from_library(&Library::builtin(), &process, &space)));
     let solids = Solids::new(printable, &space);
-    let wishes = Wishes { intent: Intent::Auto, gamma: 1.0, has_drawings: true, has_pictures: true };
+    let wishes = Wishes { intent, gamma: 1.0, has_drawings: true, has_pictures: true };
     let fit = Fit::new((printable, &solids), space, &wishes, &Silent).unwrap();
     (fit, solids)
-});
+}
 
 /// Art as it is drawn: the colour of each pixel.
 #[derive(Clone, Debug)]
