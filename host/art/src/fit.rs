@@ -84,8 +84,7 @@ impl Fit {
         let light = |level: f64| f64::from(srgb::decode(level.powf(1.0 / wishes.gamma) as f32));
         for lattice in 0..intents.len() {
             let has_tints = wishes.intent == Intent::Auto && wishes.has_drawings && lattice == of_drawings;
-            let tint =
-                |node| if has_tints { Tint::of(node, near, light) } else { Tint::of_corner(node, near) };
+            let tint = |node| if has_tints { Tint::of(node, near, light) } else { Tint::of_corner(node) };
             mix = with_tints(mix, lattice, tint, |colour| solids.named(colour)).map_err(unfitted)?;
         }
         let InkMix { stacks, maps, matrix } = mix;
@@ -187,7 +186,7 @@ mod tests {
 
     /// Whether what is printed for a pixel is part of a solid, which has a hue of its own.
     fn is_near_a_primary(pixel: [u8; 3]) -> bool {
-        let reach = Near::USUAL.edge * 255.0 / (NODES - 1) as f64;
+        let reach = 255.0 / (NODES - 1) as f64;
         let full = pixel.iter().filter(|&&v| v > 127).count();
         (1..=2).contains(&full) && pixel.iter().all(|&v| f64::from(v.min(255 - v)) < reach)
     }

@@ -108,7 +108,7 @@ impl Nodes {
 /// How far inside the cube nodes are still tints in part. A test moves each by a fifth.
 #[derive(Clone, Copy)]
 pub(super) struct Near {
-    /// In nodes from an edge of the cube, or from a primary of a lattice that has no tints.
+    /// In nodes from an edge of the cube.
     pub edge: f64,
     /// For the lines from white, as a share of the distance from white.
     pub hue: f64,
@@ -153,14 +153,13 @@ impl Tint {
         Some(Tint { parts: [(7, paper), (secondary, ink * second), (primary, ink * (1.0 - second))], part })
     }
 
-    /// The solid of a primary, of which a node near that corner has the more the nearer each of its values is.
-    pub fn of_corner(node: [usize; 3], near: Near) -> Option<Tint> {
+    /// The solid of a primary, at its own node only: what lies between it and the next nodes runs into it.
+    pub fn of_corner(node: [usize; 3]) -> Option<Tint> {
         let last = NODES - 1;
-        let corner = node.iter().fold(0, |bits, &level| 2 * bits + usize::from(2 * level > last));
-        let parts = node.map(|level| (1.0 - level.min(last - level) as f64 / near.edge).max(0.0));
+        let corner = node.iter().fold(0, |bits, &level| 2 * bits + usize::from(level == last));
         // White and black are fitted, as all greys are.
-        let is_primary = corner > 0 && corner < 7;
-        is_primary.then(|| Tint { parts: [(corner, 1.0), (7, 0.0), (7, 0.0)], part: parts.iter().product() })
+        let is_primary = (1..7).contains(&corner) && node.iter().all(|&level| level == 0 || level == last);
+        is_primary.then_some(Tint { parts: [(corner, 1.0), (7, 0.0), (7, 0.0)], part: 1.0 })
     }
 }
 
@@ -168,7 +167,7 @@ impl Tint {
 /// yellow to the red, green and blue beside them. Along them are the two stacks that the ends name, in shares that change evenly with
 /// the `amount` of the values of red, green and blue. If that is the value itself, 30 % cyan is cyan on 30 % of the dots; if it is light, a
 /// pink with a fifth of green's and blue's light is paper on a fifth of its dots. Nodes near them are such tints in part, so that a
-/// shading that ends there has no step. With [`Tint::of_corner`] only the six primaries and what is near them are printed so.
+/// shading that ends there has no step. With [`Tint::of_corner`] only the six primaries are printed so.
 pub(super) fn with_tints(
     mix: InkMix,
     lattice: usize,
