@@ -118,14 +118,19 @@ pub(super) fn closed(text: &str, close: u8) -> (&str, &str) {
     (&text[..at], text.get(at + 1..).unwrap_or_default())
 }
 
+/// Whether a value ends where it ends: its brackets and quotes are closed, and no other declaration is in it.
+pub(super) fn is_whole(value: &str) -> bool {
+    end(&format!("{value};"), b";") == value.len()
+}
+
 /// The declarations of a style or a rule; what is none is left out, and `tell` hears of rules within.
 pub(super) fn declarations<'a>(text: &'a str, tell: &mut dyn FnMut(&'a str)) -> Vec<Declaration<'a>> {
     let mut found = Vec::new();
     for part in parts(text, b';') {
         let Some((name, value)) = part.split_once(':') else { continue };
         let name = name.trim_end();
-        if !name.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_".contains(&byte) || !byte.is_ascii())
-        {
+        let letter = |byte: u8| byte.is_ascii_alphanumeric() || b"-_".contains(&byte) || !byte.is_ascii();
+        if name.is_empty() || !name.bytes().all(letter) {
             if part.contains('{') {
                 tell(part);
             }

@@ -13,7 +13,7 @@ use palette::rgb::Rgb;
 use palette::{FromColor, LinSrgb, Oklab, Oklch, Srgb, Xyz};
 use svgtypes::{Color, Length, Paint, Transform};
 
-use super::sheets::{closed, parts};
+use super::sheets::{closed, is_whole, parts};
 
 /// The most variables that are replaced in one value.
 const MOST_REPLACED: usize = 64;
@@ -42,6 +42,9 @@ pub(super) fn understood<'a>(
 ) -> Option<Value> {
     let value = replaced(value, variable, &mut { MOST_REPLACED })?;
     let value = value.trim();
+    if !is_whole(value) {
+        return None;
+    }
     let lower = value.to_ascii_lowercase();
     match (lower.as_str(), property) {
         ("inherit", _) => return Some(Plain(lower)),
