@@ -106,7 +106,7 @@ impl Data {
     }
 }
 
-/// The identity of a printer or a job, see [`Server::uuid`].
+/// The identity of a printer or a job, see [`super::Server::uuid`].
 pub fn identity(data: &Data, of: &str) -> String {
     uuid(&data.kept.seed, of)
 }
