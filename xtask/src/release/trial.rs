@@ -184,9 +184,16 @@ fn dropped(wine: &Path, program: &Path, file: &Path) -> Result<()> {
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()?;
-    if let Some(mut keys) = window.stdin.take() {
-        keys.write_all(b"\n")?;
+    // Enter, again and again: what is typed before the window listens is lost.
+    for _ in 0..60 {
+        if window.try_wait()?.is_some() {
+            break;
+        }
+        // It may close just now.
+        let _ = window.stdin.iter_mut().try_for_each(|keys| keys.write_all(b"\r"));
+        sleep(Duration::from_secs(1));
     }
+    ensure!(window.try_wait()?.is_some(), "the window of a dropped file does not close");
     let drawn = window.wait_with_output()?.stdout;
     // Wine draws letter by letter, with movements of the cursor between them and for blanks.
     let drawn = String::from_utf8_lossy(&drawn);
