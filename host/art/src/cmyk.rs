@@ -25,7 +25,7 @@ use super::names::{self, stem};
 use super::options::Options;
 use super::orientation::Turn;
 use super::size::{self, MOST_BYTES, Unstated};
-use pictures::resolution::{self, Dpi};
+use readers::resolution::{self, Dpi};
 
 /// The inks of the plates, in the order of the channels.
 pub(super) const PLATES: [Ink; 4] = [Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black];

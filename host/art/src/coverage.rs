@@ -12,7 +12,7 @@ use super::error::{io, resolution_in_words, wrong};
 use super::orientation::Turn;
 use super::size::{MOST_BYTES, check_pixels};
 use observe::Diagnosis;
-use pictures::resolution::{Dpi, of_png};
+use readers::resolution::{Dpi, of_png};
 
 /// The rule that gave the coverage.
 ///

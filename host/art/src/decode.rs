@@ -11,8 +11,8 @@ use std::path::Path;
 use ::tiff::tags::Tag;
 use image::{DynamicImage, ImageError, ImageFormat};
 use observe::Diagnosis;
-use pictures::Bounds;
-use pictures::resolution::{self, Dpi};
+use readers::Bounds;
+use readers::resolution::{self, Dpi};
 
 use super::error::{io, wrong};
 use super::orientation::Turn;
@@ -96,7 +96,7 @@ pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Res
         return Ok(of_tiff(read, &bytes));
     }
     let bounds = Bounds { side: None, bytes: 8 * MOST_PIXELS };
-    let mut opened = pictures::open(&bytes, format, bounds).map_err(bad)?;
+    let mut opened = readers::open(&bytes, format, bounds).map_err(bad)?;
     let (width, height) = opened.size();
     check_pixels(path, width, height)?;
     let profile = opened.profile();
@@ -104,7 +104,7 @@ pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Res
     let dpi = turn.dpi(resolution::of_file(&bytes, format));
     let mut image = opened.decode().map_err(bad)?;
     image.apply_orientation(turn.0);
-    let gamma = if format == ImageFormat::Png { pictures::gamma(&bytes) } else { None };
+    let gamma = if format == ImageFormat::Png { readers::gamma(&bytes) } else { None };
     Ok(Decoded { image, dpi, profile, gamma, notes: Vec::new() })
 }
 

@@ -14,7 +14,7 @@ use std::io::{BufReader, Cursor, Read as _, Seek};
 use std::path::Path;
 
 use observe::{Diagnosis, Observer};
-use pictures::resolution::{Dpi, RESOLUTIONS};
+use readers::resolution::{Dpi, RESOLUTIONS};
 use resvg::usvg::roxmltree::{Document, Node};
 use zip::ZipArchive;
 

@@ -20,7 +20,7 @@ use super::options::{Options, Pages};
 use super::picture::Looks;
 use super::size::{self, MOST_BYTES, Unstated};
 use super::{cmyk, layered, pdf, picture, svg, tiff, tiff_pages};
-use pictures::resolution::Dpi;
+use readers::resolution::Dpi;
 
 /// File extensions of pictures.
 const PICTURES: [&str; 11] = ["png", "tif", "tiff", "jpg", "jpeg", "pgm", "pbm", "ppm", "bmp", "gif", "webp"];

@@ -9,7 +9,7 @@
 use image::metadata::Orientation;
 use rayon::prelude::*;
 
-use pictures::resolution::Dpi;
+use readers::resolution::Dpi;
 
 /// How to turn the pixels of a file before they are shown.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -21,7 +21,7 @@ use super::error::{io, wrong};
 use super::options::Options;
 use super::size::{self, Unstated};
 use super::{bitplane, object_type, pixels, resample, reserved, scans};
-use pictures::resolution::Dpi;
+use readers::resolution::Dpi;
 use sheet::Plane;
 
 /// A picture in sRGB with straight alpha.

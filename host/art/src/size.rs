@@ -10,7 +10,7 @@ use std::path::Path;
 use super::error::{beyond, no_size, too_large, too_small, wrong};
 use super::options::{Options, Room};
 use observe::Diagnosis;
-use pictures::resolution::Dpi;
+use readers::resolution::Dpi;
 use sheet::Size;
 
 /// The most pixels of a picture: a page at 1200 dpi.

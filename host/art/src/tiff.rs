@@ -27,7 +27,7 @@ use super::picture::{self, Pixels};
 use super::size::{self, MOST_BYTES, Unstated};
 use super::tiff_pages;
 use observe::Diagnosis;
-use pictures::resolution::{TiffDecoder, of_tiff, tiff_decoder};
+use readers::resolution::{TiffDecoder, of_tiff, tiff_decoder};
 
 const INK_SET: Tag = Tag::Unknown(332);
 const PHOTOSHOP: Tag = Tag::Unknown(34377);

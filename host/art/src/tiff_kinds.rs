@@ -17,8 +17,8 @@ use image::{DynamicImage, GrayImage, RgbaImage};
 use observe::Diagnosis;
 use palette::convert::FromColorUnclamped;
 use palette::{Lab, Srgb, white_point::D50};
-use pictures::resolution::{TiffDecoder, tiff_decoder};
 use rayon::prelude::*;
+use readers::resolution::{TiffDecoder, tiff_decoder};
 
 use super::error::wrong;
 use super::tiff;

@@ -89,7 +89,7 @@ pub fn glb(lit: &Lit, space: &Space, name: &str, observer: &dyn Observer) -> Res
         let bytes: Vec<u8> = texels.iter().flat_map(texel).collect();
         let size = (level.width as u32, level.height as u32);
         Ok::<_, ViewError>(
-            pictures::png(&bytes, size, ExtendedColorType::Rgb8).map_err(std::io::Error::other)?,
+            readers::png(&bytes, size, ExtendedColorType::Rgb8).map_err(std::io::Error::other)?,
         )
     };
     // Red is free; occlusion, which some programs expect there, is none.

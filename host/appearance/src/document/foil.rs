@@ -123,7 +123,7 @@ pub fn write(
         }
         let at = inside.join(&file);
         let mut output = std::fs::File::create_new(&at).map_err(io(&at, "write"))?;
-        let picture = pictures::png(&row, (width as u32, height as u32), ExtendedColorType::L16)
+        let picture = readers::png(&row, (width as u32, height as u32), ExtendedColorType::L16)
             .map_err(|error| io(&at, "write")(std::io::Error::other(error)))?;
         output.write_all(&picture).map_err(io(&at, "write"))?;
         maps.push(file);

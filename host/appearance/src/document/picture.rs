@@ -104,7 +104,7 @@ impl Picture {
         source: &mut Source<'_>,
     ) -> Result<Picture, DocumentError> {
         let wrong = |problem: String| DocumentError::Picture { path: path.to_path_buf(), problem };
-        let format = pictures::format(bytes, path);
+        let format = readers::format(bytes, path);
         let Some((format, kind)) = format.and_then(|format| Some((format, kind(format)?))) else {
             let found = if bytes.is_empty() { "an empty file" } else { "another format" };
             return Err(wrong(format!(
@@ -312,8 +312,8 @@ fn decode_image(bytes: &[u8], format: ImageFormat, path: &Path) -> Result<Pictur
             _ => format!("cannot decode the image: {error}"),
         })
     };
-    let bounds = pictures::Bounds { side: Some(MOST_SIDE as u32), bytes: 4 * MOST_VALUES };
-    let mut opened = pictures::open(bytes, format, bounds).map_err(damaged)?;
+    let bounds = readers::Bounds { side: Some(MOST_SIDE as u32), bytes: 4 * MOST_VALUES };
+    let mut opened = readers::open(bytes, format, bounds).map_err(damaged)?;
     let ((width, height), colour) = (opened.size(), opened.colour());
     let channels = u64::from(colour.channel_count());
     let most = if u64::from(colour.bytes_per_pixel()) == 4 * channels { MOST_FLOATS } else { MOST_VALUES };
@@ -322,7 +322,7 @@ fn decode_image(bytes: &[u8], format: ImageFormat, path: &Path) -> Result<Pictur
     let foreign_profile = opened.profile().is_some_and(|bytes| !is_srgb(&bytes));
     let turned = opened.orientation() != image::metadata::Orientation::NoTransforms;
     let decoded = opened.decode().map_err(damaged)?;
-    let gamma = if format == ImageFormat::Png { pictures::gamma(bytes) } else { None };
+    let gamma = if format == ImageFormat::Png { readers::gamma(bytes) } else { None };
     let (width, height) = (decoded.width() as usize, decoded.height() as usize);
     let picture = |channels, values| Picture {
         width,
@@ -356,23 +356,23 @@ fn decode_image(bytes: &[u8], format: ImageFormat, path: &Path) -> Result<Pictur
 
 fn decode_exr(bytes: &[u8], path: &Path) -> Result<Picture, DocumentError> {
     let wrong = |problem: String| DocumentError::Picture { path: path.to_path_buf(), problem };
-    for (width, height, channels) in pictures::exr_sizes(bytes).map_err(wrong)? {
+    for (width, height, channels) in readers::exr_sizes(bytes).map_err(wrong)? {
         check_size(path, width as u64, height as u64, channels as u64, MOST_FLOATS)?;
     }
-    of_floats(pictures::exr(bytes).map_err(wrong)?, path)
+    of_floats(readers::exr(bytes).map_err(wrong)?, path)
 }
 
 /// A TIFF with floating-point samples; `None` if they are whole numbers.
 fn decode_floats(bytes: &[u8], path: &Path) -> Result<Option<Picture>, DocumentError> {
     let wrong = |problem: String| DocumentError::Picture { path: path.to_path_buf(), problem };
-    let Some(file) = pictures::float_tiff(bytes).map_err(wrong)? else { return Ok(None) };
+    let Some(file) = readers::float_tiff(bytes).map_err(wrong)? else { return Ok(None) };
     let (width, height) = file.size();
     check_size(path, u64::from(width), u64::from(height), file.channels() as u64, MOST_FLOATS)?;
     of_floats(file.decode().map_err(wrong)?, path).map(Some)
 }
 
-fn of_floats(floats: pictures::Floats, path: &Path) -> Result<Picture, DocumentError> {
-    let pictures::Floats { width, height, channels, values, primaries } = floats;
+fn of_floats(floats: readers::Floats, path: &Path) -> Result<Picture, DocumentError> {
+    let readers::Floats { width, height, channels, values, primaries } = floats;
     let matrix = primaries.as_ref().map_or(Ok(None), to_rec_709);
     let matrix = matrix.map_err(|problem| DocumentError::Picture { path: path.to_path_buf(), problem })?;
     let values = Values::Float(values);

@@ -7,7 +7,7 @@
 //! and the caller clamps them.
 //! Source: SMPTE RP 177-1993; ICC.1:2022, annex E (Bradford).
 
-use pictures::Primaries;
+use readers::Primaries;
 
 type Matrix = [[f64; 3]; 3];
 

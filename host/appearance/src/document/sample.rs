@@ -20,7 +20,7 @@ pub fn write_sample(sample: &Sample, folder: &Path) -> Result<(), DocumentError>
     for (file, data, colour) in painting.maps() {
         let path = folder.join(file);
         let mut output = std::fs::File::create_new(&path).map_err(io(&path))?;
-        let picture = pictures::png(&data, (painting.width as u32, painting.height as u32), colour)
+        let picture = readers::png(&data, (painting.width as u32, painting.height as u32), colour)
             .map_err(|error| io(&path)(std::io::Error::other(error)))?;
         output.write_all(&picture).map_err(io(&path))?;
     }

@@ -237,7 +237,7 @@ fn write_mask(painted: &Painted, at: &Path) -> Result<(), DocumentError> {
     let mut output = std::fs::File::create_new(at).map_err(io)?;
     let greys: Vec<u8> = painted.values.iter().flat_map(|&w| to_grey(w).to_ne_bytes()).collect();
     let size = (painted.width as u32, painted.height as u32);
-    let picture = pictures::png(&greys, size, ExtendedColorType::L16)
+    let picture = readers::png(&greys, size, ExtendedColorType::L16)
         .map_err(|error| io(std::io::Error::other(error)))?;
     output.write_all(&picture).map_err(io)
 }

@@ -16,7 +16,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use image::{ImageError, ImageFormat};
 use percent_encoding::percent_decode_str;
-use pictures::{Bounds, Opened};
+use readers::{Bounds, Opened};
 use resvg::usvg::{ImageHrefResolver, ImageKind};
 
 use super::super::decode::whole_jpeg;
@@ -162,7 +162,7 @@ fn fault(picture: &ImageKind, known: &Known) -> Option<&'static str> {
             return Some(DAMAGED);
         }
         const LARGE: &str = "has too many pixels";
-        let opened = match pictures::open(bytes, format, Bounds { side: None, bytes: 8 * MOST_PIXELS }) {
+        let opened = match readers::open(bytes, format, Bounds { side: None, bytes: 8 * MOST_PIXELS }) {
             Ok(opened) => opened,
             Err(ImageError::Limits(_)) => return Some(LARGE),
             Err(_) => return Some(DAMAGED),

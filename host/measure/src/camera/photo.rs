@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use exif::{In, Tag};
 use image::DynamicImage;
 use image::metadata::Orientation;
-use pictures::Bounds;
+use readers::Bounds;
 
 use crate::MeasureError;
 
@@ -179,7 +179,7 @@ fn decode(bytes: &[u8], path: &Path, turn: bool) -> Result<Photo, MeasureError> 
     };
     let format = image::guess_format(bytes).map_err(|e| wrong(&e))?;
     let bounds = Bounds { side: None, bytes: 16 * MOST_PIXELS };
-    let mut opened = pictures::open(bytes, format, bounds).map_err(|e| wrong(&e))?;
+    let mut opened = readers::open(bytes, format, bounds).map_err(|e| wrong(&e))?;
     let (width, height) = opened.size();
     if u64::from(width) * u64::from(height) > MOST_PIXELS {
         let problem = format!("{width} x {height} pixels; the limit is {} million", MOST_PIXELS / 1_000_000);

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use pictures::resolution::of_file;
+use readers::resolution::of_file;
 
 use crate::MeasureError;
 

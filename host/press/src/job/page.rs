@@ -24,7 +24,7 @@ pub struct Pictures {
 /// When a picture cannot be compressed.
 pub fn html(plan: &Plan, pictures: &Pictures) -> Result<String, image::ImageError> {
     let encoded = |picture: &RgbImage| {
-        let png = pictures::png(picture, picture.dimensions(), ExtendedColorType::Rgb8)?;
+        let png = readers::png(picture, picture.dimensions(), ExtendedColorType::Rgb8)?;
         Ok::<String, image::ImageError>(STANDARD.encode(png))
     };
     let sheet = encoded(&pictures.sheet)?;

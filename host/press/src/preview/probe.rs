@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 use image::ImageFormat;
-use pictures::{Bounds, Opened};
+use readers::{Bounds, Opened};
 
 use super::error::PreviewError;
 
@@ -84,10 +84,10 @@ impl Probe {
     /// Reads a panorama, or says what is wrong with it.
     fn from_bytes(bytes: &[u8]) -> Result<Probe, String> {
         if bytes.starts_with(&OPEN_EXR) {
-            let opened = pictures::open(bytes, ImageFormat::OpenExr, BOUNDS).map_err(|e| e.to_string())?;
+            let opened = readers::open(bytes, ImageFormat::OpenExr, BOUNDS).map_err(|e| e.to_string())?;
             return Probe::decoded(opened, 1.0);
         }
-        let (opened, exposure) = pictures::open_radiance(bytes, BOUNDS).map_err(|e| e.to_string())?;
+        let (opened, exposure) = readers::open_radiance(bytes, BOUNDS).map_err(|e| e.to_string())?;
         // The program that wrote the file multiplied the pixels by the exposure in the header.
         if !(exposure.is_finite() && exposure > 0.0) {
             return Err(format!("EXPOSURE={exposure} must be above 0"));

@@ -24,10 +24,10 @@ use art::{
     Accept, Composed, Finish, GAMMAS, Intent, MOST_CHOKE_MM, Order, Pages, Room, TOLERANCES, White, names,
 };
 use observe::Observer;
-use pictures::resolution::RESOLUTIONS;
 use press::job::plan::{Suggestion, grouped};
 use press::layout::{self, Layout, Mm, NoLength};
 use press::pipeline;
+use readers::resolution::RESOLUTIONS;
 use sheet::DOTS_PER_MM;
 use sheet::Size;
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use appearance::brdf::Space;
 use appearance::materials::Materials;
 use appearance::srgb::decode;
-use pictures::Bounds;
+use readers::Bounds;
 
 use super::DisplayError;
 
@@ -38,7 +38,7 @@ impl Matte {
     pub fn read(path: &Path, space: Space) -> Result<Matte, DisplayError> {
         let bad = |problem: String| DisplayError::Picture(format!("{}: {problem}", path.display()));
         let bytes = std::fs::read(path).map_err(|error| bad(format!("cannot be read: {error}")))?;
-        let decoded = || pictures::open(&bytes, image::guess_format(&bytes)?, BOUNDS)?.decode();
+        let decoded = || readers::open(&bytes, image::guess_format(&bytes)?, BOUNDS)?.decode();
         let image = decoded().map_err(|error| match error {
             image::ImageError::Limits(_) => {
                 bad(format!("the picture is too large; at most {LONGEST} pixels a side and 1 GB are read"))

@@ -270,7 +270,7 @@ pub fn printed_name(path: &Path) -> String {
 /// A picture as PNG.
 pub fn png(radiance: &Radiance, tone: ToneCurve) -> Result<Vec<u8>> {
     let picture = picture(radiance, tone)?;
-    Ok(pictures::png(&picture, picture.dimensions(), ExtendedColorType::Rgb8)?)
+    Ok(readers::png(&picture, picture.dimensions(), ExtendedColorType::Rgb8)?)
 }
 
 #[cfg(test)]
