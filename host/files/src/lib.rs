@@ -1,11 +1,13 @@
 //! Small files that appear whole or not at all, and settings and descriptions in TOML.
 //!
 //! A file is written beside its final place and renamed, so nobody ever reads half of one. A text is read up to 1 MB, so
-//! a file that is not one of ours cannot fill the memory. [`durable`] is for what has to outlive a crash.
+//! a file that is not one of ours cannot fill the memory. [`durable`] is for what has to outlive a crash, [`shelf`] is what readers
+//! of documents see of a disk.
 #![deny(unsafe_code)]
 
 pub mod durable;
 pub mod scratch;
+pub mod shelf;
 
 use std::io::{BufWriter, Read as _, Write};
 use std::path::{Path, PathBuf};
@@ -17,12 +19,24 @@ const MOST_TEXT: u64 = 1 << 20;
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     /// The system refused; it says why.
-    #[error("{}: cannot be read or written", path.display())]
+    #[error("{}: cannot {attempt}", path.display())]
     Io {
-        /// The file.
+        /// The file or folder.
         path: PathBuf,
+        /// What was attempted: open, read, list, write.
+        attempt: &'static str,
         /// What the system said.
         source: std::io::Error,
+    },
+    /// The file is longer than anything of its kind.
+    #[error("{}: size in bytes is {found}; the limit is {most}", path.display())]
+    Large {
+        /// The file.
+        path: PathBuf,
+        /// Its size, or more than the limit.
+        found: u64,
+        /// The limit.
+        most: u64,
     },
     /// A text file does not say what it should.
     #[error("{}: {problem}", path.display())]
@@ -52,9 +66,9 @@ pub enum FileError {
     },
 }
 
-/// What the system said of a file, as an error.
-pub fn io(path: &Path) -> impl Fn(std::io::Error) -> FileError + '_ {
-    move |source| FileError::Io { path: path.to_path_buf(), source }
+/// What the system said of a file, as an error: what was attempted, such as `open`, `read` or `write`.
+pub fn io<'a>(path: &'a Path, attempt: &'static str) -> impl Fn(std::io::Error) -> FileError + 'a {
+    move |source| FileError::Io { path: path.to_path_buf(), attempt, source }
 }
 
 /// Writes a file beside its final place and renames it, so that no half-written file is ever seen.
@@ -71,11 +85,11 @@ pub fn write(
         // The user's umask decides, as for any other file; temporary files are private otherwise.
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let mut file = builder.tempfile_in(folder).map_err(io(folder))?;
+    let mut file = builder.tempfile_in(folder).map_err(io(folder, "write in"))?;
     let mut buffer = BufWriter::with_capacity(1 << 16, file.as_file_mut());
-    with(&mut buffer).and_then(|()| buffer.flush()).map_err(io(path))?;
+    with(&mut buffer).and_then(|()| buffer.flush()).map_err(io(path, "write"))?;
     drop(buffer);
-    file.persist(path).map_err(|error| io(path)(error.error))?;
+    file.persist(path).map_err(|error| io(path, "write")(error.error))?;
     Ok(())
 }
 
@@ -89,9 +103,9 @@ pub fn write_toml(path: &Path, value: &impl serde::Serialize) -> Result<(), File
 /// Reads TOML of at most a megabyte; unknown fields are the type's own business.
 pub fn read_toml<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, FileError> {
     let wrong = |problem: String| FileError::Text { path: path.to_path_buf(), problem };
-    let file = std::fs::File::open(path).map_err(io(path))?;
+    let file = std::fs::File::open(path).map_err(io(path, "open"))?;
     let mut text = String::new();
-    file.take(MOST_TEXT + 1).read_to_string(&mut text).map_err(io(path))?;
+    file.take(MOST_TEXT + 1).read_to_string(&mut text).map_err(io(path, "read"))?;
     if text.len() as u64 > MOST_TEXT {
         return Err(wrong(format!("more than {MOST_TEXT} bytes")));
     }

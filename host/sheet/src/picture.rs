@@ -74,7 +74,7 @@ pub fn write_png(
 
 /// Reads a picture that must be of this size and kind; for an indexed one the colours may differ, not their number.
 pub fn read_png(path: &Path, (width, length): (usize, usize), kind: Kind) -> Result<Vec<u8>, FileError> {
-    let file = std::fs::File::open(path).map_err(io(path))?;
+    let file = std::fs::File::open(path).map_err(io(path, "open"))?;
     let bad = |source| FileError::Png { path: path.to_path_buf(), source };
     let bytes = width.max(64) * length.max(64);
     let mut decoder =

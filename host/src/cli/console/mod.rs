@@ -163,7 +163,7 @@ mod tests {
             (Box::new(DocumentError::Curve(CurveError::Io { path: path(), source: disk() })), fire()),
             (Box::new(FactorError::Weights(weights())), weights().to_string()),
             (Box::new(mixture()), MixtureError::NoStacks.to_string()),
-            (Box::new(MixFileError::Io { path: path(), source: disk() }), fire()),
+            (Box::new(MixFileError::Io { path: path(), attempt: "open", source: disk() }), fire()),
             (Box::new(MixFileError::Weights { path: path(), source: weights() }), weights().to_string()),
             (
                 Box::new(MixFileError::Mix { path: path(), source: MixError::Rows { rows: 2, channels: 3 } }),
@@ -172,7 +172,7 @@ mod tests {
             (Box::new(art()), fire()),
             (Box::new(StageError::Gamut(mixture())), MixtureError::NoStacks.to_string()),
             (Box::new(JobError::Simulate(SimulateError::Carousel(carousel()))), carousel().to_string()),
-            (Box::new(FileError::Io { path: path(), source: disk() }), fire()),
+            (Box::new(FileError::Io { path: path(), attempt: "open", source: disk() }), fire()),
             (Box::new(png()), fire()),
             (Box::new(press::job::stream::StreamError::Output(disk())), fire()),
             (Box::new(DriveError::Refused { drive: path(), source: disk() }), fire()),
