@@ -6,6 +6,7 @@
 //! Casts that can lose a value are not allowed here: numbers come from command lines, print systems and raster headers, so
 //! they are converted with a check or an error. `cast_possible_wrap` stays off: what becomes signed is a count of dots or
 //! pixels on one page. Tests cast numbers of their own choice.
+#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the standard mathematics"))]
 #![forbid(unsafe_code)]
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation, clippy::cast_sign_loss))]
 

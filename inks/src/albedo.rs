@@ -8,6 +8,7 @@
 //! Cost: `RINGS x AZIMUTHS` once, then one product with `RINGS` samples per curve.
 //! Limits: exact only for BRDFs that depend on theta_h alone, as curves do.
 
+use maths::Maths;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::Curve;
@@ -25,16 +26,16 @@ pub struct Albedo {
 impl Albedo {
     /// The quadrature for light that arrives `incidence` radians from the normal, 0..pi/2.
     pub fn new(incidence: f64) -> Albedo {
-        let (sin_i, cos_i) = incidence.sin_cos();
+        let (sin_i, cos_i) = incidence.sine_cosine();
         let (mut theta, mut weight) = (Vec::with_capacity(RINGS), Vec::with_capacity(RINGS));
         for ring in 0..RINGS {
             let u = (ring as f64 + 0.5) / RINGS as f64;
             let t = FRAC_PI_2 * u * u;
-            let (sin_h, cos_h) = t.sin_cos();
+            let (sin_h, cos_h) = t.sine_cosine();
             let mut around = 0.0;
             for azimuth in 0..AZIMUTHS {
                 let phi = PI * (azimuth as f64 + 0.5) / AZIMUTHS as f64;
-                let facing = sin_i * sin_h * phi.cos() + cos_i * cos_h;
+                let facing = sin_i * sin_h * phi.cosine() + cos_i * cos_h;
                 let cos_o = 2.0 * facing * cos_h - cos_i;
                 if facing > 0.0 && cos_o > 0.0 {
                     around += 4.0 * facing * cos_o;

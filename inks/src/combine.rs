@@ -7,6 +7,7 @@
 //! list, or else the one with the fewest layers. Cost: one evaluation of the model for each set that the rules allow, one or
 //! two hundred. Limits: a library with a measured stack offers only what was measured.
 
+use maths::Maths;
 use std::collections::HashSet;
 
 use protocol::ink::Ink;
@@ -124,7 +125,7 @@ fn is_above(ink: Ink, other: Ink) -> bool {
 fn look(lobes: &Lobes) -> Vec<u64> {
     let at = [0.0, 0.03, 0.1, 0.3, 0.8].into_iter().flat_map(|theta| lobes.at(theta));
     // Adding 0 turns a negative zero into the positive one.
-    at.map(|f| ((1000.0 * f.max(1e-9).ln()).round() + 0.0).to_bits()).collect()
+    at.map(|f| ((1000.0 * f.max(1e-9).logarithm()).round() + 0.0).to_bits()).collect()
 }
 
 #[cfg(test)]

@@ -4,6 +4,8 @@
 //! theta_i = theta_o = theta_h = t the lobe is `F0 D(t) G(t) / (4 cos^2 t)`, in 1/sr.
 //! Cost: a handful of operations. Limits: isotropic; alpha is the microfacet width (roughness squared).
 
+use maths::Maths;
+
 /// Distribution of microfacet normals, `D(t) = a^2 / (pi (cos^2 t (a^2 - 1) + 1)^2)`, in 1/sr.
 pub fn distribution(cos_t: f64, alpha: f64) -> f64 {
     let a2 = alpha * alpha;
@@ -20,7 +22,7 @@ pub fn shadowing(cos_t: f64, alpha: f64) -> f64 {
 
 /// The lobe for unit F0, `D G / (4 cos^2 t)`, in 1/sr; multiply by F0. `t` in radians, finite at pi/2.
 pub fn lobe(t: f64, alpha: f64) -> f64 {
-    let c = t.cos().max(1e-6);
+    let c = t.cosine().max(1e-6);
     distribution(c, alpha) * shadowing(c, alpha) / (4.0 * c * c)
 }
 

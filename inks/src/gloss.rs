@@ -11,6 +11,7 @@
 //! the diffuse body, [`reading`] counts it. Because of the long tails of GGX, a lobe reads lower than its visible sharpness suggests, and
 //! readings at several angles disagree about its width: the disagreement is part of the answer.
 
+use maths::Maths;
 use std::f64::consts::PI;
 
 use crate::curve::Curve;
@@ -63,7 +64,7 @@ fn reflectance(f0: f64, cos: f64) -> f64 {
     } else if f0 <= DIELECTRIC {
         fresnel((1.0 + f0.sqrt()) / (1.0 - f0.sqrt()), cos)
     } else {
-        f0 + (1.0 - f0) * (1.0 - cos).powi(5)
+        f0 + (1.0 - f0) * (1.0 - cos).whole_power(5)
     }
 }
 
@@ -78,7 +79,7 @@ fn lambda(cos: f64, alpha: f64) -> f64 {
 
 /// The integral of `f cos_o` over the window, where `f` gets the outgoing direction and the beam arrives in the plane y = 0.
 fn through_window(geometry: Geometry, f: impl Fn([f64; 3]) -> f64) -> f64 {
-    let (sin_i, cos_i) = geometry.degrees.to_radians().sin_cos();
+    let (sin_i, cos_i) = geometry.degrees.to_radians().sine_cosine();
     let half = geometry.window.map(f64::to_radians);
     // The position and width of a step. Steps are smallest in the centre, where narrow lobes are.
     let at = |i: usize, half: f64| {
@@ -90,10 +91,10 @@ fn through_window(geometry: Geometry, f: impl Fn([f64; 3]) -> f64) -> f64 {
         for column in 0..STEPS {
             let ((along, height), (across, width)) = (at(row, half[0]), at(column, half[1]));
             // The direction through this point of a flat window perpendicular to the mirror direction.
-            let (x, y) = (along.tan(), across.tan());
+            let (x, y) = (along.tangent(), across.tangent());
             let length = (1.0 + x * x + y * y).sqrt();
             let o = [(sin_i + cos_i * x) / length, y / length, (cos_i - sin_i * x) / length];
-            let solid_angle = (1.0 + x * x) * (1.0 + y * y) / length.powi(3);
+            let solid_angle = (1.0 + x * x) * (1.0 + y * y) / length.cubed();
             sum += f(o) * solid_angle * height * width;
         }
     }
@@ -102,7 +103,7 @@ fn through_window(geometry: Geometry, f: impl Fn([f64; 3]) -> f64) -> f64 {
 
 /// The ratio of light through the window to light in the beam, for one lobe.
 fn of_lobe(geometry: Geometry, lobe: &Lobe) -> f64 {
-    let (sin_i, cos_i) = geometry.degrees.to_radians().sin_cos();
+    let (sin_i, cos_i) = geometry.degrees.to_radians().sine_cosine();
     let f0 = luminance(lobe.f0);
     through_window(geometry, |o| {
         let h = [o[0] - sin_i, o[1], o[2] + cos_i];
@@ -116,7 +117,7 @@ fn of_lobe(geometry: Geometry, lobe: &Lobe) -> f64 {
 
 /// Gloss units for a share of the beam.
 fn relative(geometry: Geometry, share: f64) -> f64 {
-    100.0 * share / fresnel(GLASS, geometry.degrees.to_radians().cos())
+    100.0 * share / fresnel(GLASS, geometry.degrees.to_radians().cosine())
 }
 
 /// Gloss units at 60 degrees of the lobes alone.
@@ -166,7 +167,7 @@ impl Split {
         for _ in 0..ROUNDS {
             split.f0 = 0.0;
             for (&f, (t, dt)) in values.iter().zip((0..STEPS).map(step)) {
-                let (sin, cos) = t.sin_cos();
+                let (sin, cos) = t.sine_cosine();
                 let d = 4.0 * cos * cos * (f - split.body).max(0.0) / ggx::shadowing(cos, split.alpha);
                 split.f0 += d * cos * 2.0 * PI * sin * dt;
             }
@@ -187,14 +188,14 @@ impl Split {
 
     /// Gloss units at an angle of the curve that was split.
     fn reading(&self, geometry: Geometry, curve: &Curve) -> f64 {
-        let (sin_i, cos_i) = geometry.degrees.to_radians().sin_cos();
+        let (sin_i, cos_i) = geometry.degrees.to_radians().sine_cosine();
         let per_f0 = 1.0 / self.f0.max(f64::MIN_POSITIVE);
         let share = through_window(geometry, |o| {
             let h = [o[0] - sin_i, o[1], o[2] + cos_i];
             let length = (h[0] * h[0] + h[1] * h[1] + h[2] * h[2]).sqrt();
             let (cos_h, cos_d) = ((h[2] / length).min(1.0), (cos_i * h[2] - sin_i * h[0]) / length);
             // f = F0 D G / (4 cos^2 h) of the curve gives D, and the directions give F and G.
-            let distribution = 4.0 * cos_h * cos_h * self.lobe(curve, cos_h.acos())
+            let distribution = 4.0 * cos_h * cos_h * self.lobe(curve, cos_h.arccosine())
                 / ggx::shadowing(cos_h, self.alpha).max(f64::MIN_POSITIVE);
             let shadowing = 1.0 / (1.0 + lambda(cos_i, self.alpha) + lambda(o[2], self.alpha));
             let lobe = reflectance(self.f0, cos_d) * per_f0 * distribution * shadowing / (4.0 * cos_i);
@@ -221,22 +222,22 @@ pub fn width(readings: &[(Geometry, f64)], body: impl Fn(f64) -> Lobes) -> Optio
     if readings.is_empty() || readings.iter().any(|(_, read)| !(read.is_finite() && *read > 0.0)) {
         return None;
     }
-    let sigma = |read: f64| METER[1].hypot(METER[0] / read);
+    let sigma = |read: f64| METER[1].hypotenuse(METER[0] / read);
     let off = |(geometry, read): &(Geometry, f64), ln: f64| {
-        (reading(*geometry, &body(ln.exp())).max(1e-12) / read).ln() / sigma(*read)
+        (reading(*geometry, &body(ln.exponential())).max(1e-12) / read).logarithm() / sigma(*read)
     };
     let least = |readings: &[(Geometry, f64)]| {
-        let cost = |ln: f64| readings.iter().map(|r| off(r, ln).powi(2)).sum::<f64>();
-        lowest(cost, WIDTHS.map(f64::ln))
+        let cost = |ln: f64| readings.iter().map(|r| off(r, ln).squared()).sum::<f64>();
+        lowest(cost, WIDTHS.map(f64::logarithm))
     };
     let ln = least(readings);
     let step = 1e-3;
     let slope = |r: &(Geometry, f64)| (off(r, ln + step) - off(r, ln - step)) / (2.0 * step);
-    let meter = readings.iter().map(|r| slope(r).powi(2)).sum::<f64>().max(1e-12).sqrt().recip();
+    let meter = readings.iter().map(|r| slope(r).squared()).sum::<f64>().max(1e-12).sqrt().recip();
     let alone = readings.iter().map(|r| least(&[*r]) - ln);
     let disagreement = if readings.len() > 1 { alone.fold(0.0, |a: f64, b| a.max(b.abs())) } else { 0.0 };
     let misfit = readings.iter().map(|r| (off(r, ln) * sigma(r.1)).abs()).fold(0.0, f64::max);
-    Some(Width { alpha: ln.exp(), uncertainty: meter.hypot(disagreement), misfit })
+    Some(Width { alpha: ln.exponential(), uncertainty: meter.hypotenuse(disagreement), misfit })
 }
 
 /// Where a function of one number is lowest: the best of a grid, refined by golden sections.

@@ -8,6 +8,7 @@
 //! Limits: an error that is smooth in the angle, such as a wrong scale, shows only in the energy and beside other stacks.
 //! Reciprocity needs no check: a function of the half angle has it.
 
+use maths::Maths;
 use std::path::Path;
 
 use protocol::ink::Kind;
@@ -172,7 +173,7 @@ impl Judge<'_> {
                     continue;
                 };
                 let floor = self.curve.rgb()[low][c];
-                let doubt = 2.0 * self.sigma(i)[c].hypot(self.sigma(low)[c]);
+                let doubt = 2.0 * self.sigma(i)[c].hypotenuse(self.sigma(low)[c]);
                 let rise = (value - floor) / floor.max(1e-12);
                 if value - floor > doubt && rise > RISE && worst.is_none_or(|worst| rise > worst.0) {
                     worst = Some((rise, low, i, c));
@@ -204,7 +205,7 @@ impl Judge<'_> {
             });
             let spread = (1.0 + weights.iter().map(|w| w * w).sum::<f64>()).sqrt();
             for c in 0..3 {
-                let log: Vec<f64> = five.iter().map(|&i| self.curve.rgb()[i][c].ln()).collect();
+                let log: Vec<f64> = five.iter().map(|&i| self.curve.rgb()[i][c].logarithm()).collect();
                 let middle: f64 = around.iter().zip(weights).map(|(&i, w)| w * log[i]).sum();
                 let difference = (log[2] - middle).abs() / spread;
                 if difference.is_finite() {
@@ -256,7 +257,7 @@ pub(crate) fn filters(entries: &[Entry], findings: &mut Findings) {
         };
         let sigma = |entry: &Entry| entry.uncertainty.as_ref().map_or([0.0; 3], |u| u.at(theta));
         let (more, less) = (above.curve.at(theta), below.curve.at(theta));
-        let doubt: [f64; 3] = std::array::from_fn(|c| 2.0 * sigma(above)[c].hypot(sigma(below)[c]));
+        let doubt: [f64; 3] = std::array::from_fn(|c| 2.0 * sigma(above)[c].hypotenuse(sigma(below)[c]));
         let limit = |c: usize| less[c] * (1.0 + RISE) + SURFACE + doubt[c];
         if let Some(c) = (0..3).find(|&c| more[c] > limit(c)) {
             let text = format!(

@@ -13,6 +13,8 @@
 //! Limits: beyond an extremum a value may exceed the sample by 2/27 of the larger step to a neighbour, in ln f; beyond
 //! 81.7 degrees, the last but one of 32 samples, errors grow to 2 % (`docs/decisions/between-samples.md`).
 
+use maths::Maths;
+
 /// Samples that a slope depends on.
 const WINDOW: usize = 5;
 /// The cosine below which ln f is no longer stretched: 88 degrees.
@@ -44,8 +46,8 @@ enum Between {
 }
 
 fn coordinate(theta: f64) -> f64 {
-    let cos = theta.cos();
-    4.0 * theta.abs().sqrt().copysign(theta) - 0.5 * (cos * cos + GRAZING * GRAZING).ln()
+    let cos = theta.cosine();
+    4.0 * theta.abs().sqrt().copysign(theta) - 0.5 * (cos * cos + GRAZING * GRAZING).logarithm()
 }
 
 impl Knots {
@@ -87,7 +89,11 @@ impl Knots {
         let (i, s) = match place.0 {
             Between::Below(part) => {
                 let (first, second) = (sample(0), sample(1));
-                return if first > 0.0 && second > 0.0 { first * (first / second).powf(part) } else { first };
+                return if first > 0.0 && second > 0.0 {
+                    first * (first / second).power(part)
+                } else {
+                    first
+                };
             }
             Between::At(i, 0.0) => return sample(i),
             Between::At(i, s) => (i, s),
@@ -100,13 +106,13 @@ impl Knots {
         let first = self.derivative[i].0.min(i.saturating_sub(2));
         let last = self.x.len() - 1;
         let logarithms: [f64; WINDOW + 1] =
-            std::array::from_fn(|j| sample((first + j).min(last)).max(f64::MIN_POSITIVE).ln());
+            std::array::from_fn(|j| sample((first + j).min(last)).max(f64::MIN_POSITIVE).logarithm());
         let ln = |i: usize| logarithms[i - first];
         let h = self.x[i + 1] - self.x[i];
-        let step = (to / from).ln();
+        let step = (to / from).logarithm();
         let (start, end) = (h * self.slope(i, ln), h * self.slope(i + 1, ln));
         let rest = 1.0 - s;
-        from * (s * s * (3.0 - 2.0 * s) * step + s * rest * (rest * start - s * end)).exp()
+        from * (s * s * (3.0 - 2.0 * s) * step + s * rest * (rest * start - s * end)).exponential()
     }
 
     /// The limited slope of `y` over x at knot `i`.
@@ -149,7 +155,7 @@ impl Knots {
     /// The slope at the first knot of a function that is even in theta, in slopes of the first chord.
     fn start(&self) -> f64 {
         let (a, b) = (self.theta[0], self.theta[1]);
-        let (sin, cos) = a.sin_cos();
+        let (sin, cos) = a.sine_cosine();
         let stretch = 2.0 / a.abs().sqrt() + sin * cos / (cos * cos + GRAZING * GRAZING);
         2.0 * a / stretch * (self.x[1] - self.x[0]) / (b * b - a * a)
     }

@@ -4,6 +4,8 @@
 //! Rec. 709 under D65. Method: CIE 15 inverse, Bradford adaptation, the Rec. 709 matrix. Limits: the result is
 //! not clipped, and inks such as cyan lie outside the gamut, so a channel may be negative. The inverse undoes it to the last digits.
 
+use maths::Maths;
+
 /// White points as XYZ with Y = 1.
 const D50: [f64; 3] = [0.96422, 1.0, 0.82521];
 const D65: [f64; 3] = [0.95047, 1.0, 1.08883];
@@ -60,7 +62,7 @@ pub fn from_linear_rgb(rgb: [f64; 3]) -> [f64; 3] {
     let delta: f64 = 6.0 / 29.0;
     let f: [f64; 3] = std::array::from_fn(|i| {
         let v = xyz[i] / D50[i];
-        if v > delta.powi(3) { v.cbrt() } else { v / (3.0 * delta * delta) + 4.0 / 29.0 }
+        if v > delta.cubed() { v.cube_root() } else { v / (3.0 * delta * delta) + 4.0 / 29.0 }
     });
     [116.0 * f[1] - 16.0, 500.0 * (f[0] - f[1]), 200.0 * (f[1] - f[2])]
 }

@@ -1,4 +1,5 @@
 //! The ink library: cartridges, the reflectance of each stack of layers, and the source of each number.
+#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the standard mathematics"))]
 #![forbid(unsafe_code)]
 #![warn(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)]
 #![allow(

@@ -9,6 +9,7 @@
 //! Cost: a few operations per layer. Limits: full coverage, no trapping, no scattering between layers; light and eye in one
 //! place. Combinations that the model was not fitted to (a filter over finish, primer over metal) follow the same rules.
 
+use maths::Maths;
 use protocol::ink::Ink;
 use serde::Deserialize;
 use toml::Spanned;
@@ -312,7 +313,7 @@ impl Optics {
         let power = metal.seen_power.as_ref().map_or(1.0, Figure::get);
         pile.kd = each(body, |c, v| metal.diffuse.get() * v * t[c]);
         let aluminium = self.model.aluminium.get();
-        let f0 = each(colour, |c, v| metal.reflectance.get() * aluminium[c] * v * t[c].powf(power));
+        let f0 = each(colour, |c, v| metal.reflectance.get() * aluminium[c] * v * t[c].power(power));
         let smoother = if primed { metal.alpha_on_primer.get() } else { 1.0 };
         pile.metal = Some(Lobe { f0, alpha: (metal.alpha.get() * smoother).min(1.0) });
         pile.surface = match (&metal.binder_f0, &metal.binder_alpha) {

@@ -6,6 +6,7 @@
 mod curves;
 pub(crate) mod fields;
 
+use maths::Maths;
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
@@ -390,7 +391,7 @@ fn merge_rules(given: Vec<Spanned<Rule>>, rules: &mut Vec<Rule>, findings: &mut 
 /// 90 degrees, so beyond the grid the last value is used.
 pub(crate) fn grid() -> Vec<f64> {
     const STEPS: u32 = 512;
-    (0..STEPS).map(|n| FRAC_PI_2 * (f64::from(n) / f64::from(STEPS)).powi(2)).collect()
+    (0..STEPS).map(|n| FRAC_PI_2 * (f64::from(n) / f64::from(STEPS)).squared()).collect()
 }
 
 /// Makes the entry of a stack, with the checks that need its curve.

@@ -1,5 +1,7 @@
 //! Equation 1 at every pixel of rusty metal (synthetic without FOILPRESS_DATA), on all threads.
 
+#![allow(clippy::disallowed_methods, reason = "it decides no dot of a job")]
+
 use std::borrow::Cow;
 
 use appearance::brdf::Table;

@@ -2,6 +2,8 @@
 //!
 //! Without the textures it uses a synthetic document of the same size, so the benchmark always runs.
 
+#![allow(clippy::disallowed_methods, reason = "it decides no dot of a job")]
+
 use std::path::Path;
 
 use appearance::brdf::Space;

@@ -1,5 +1,7 @@
 //! Equation 1 for one basis: all starts, one start, and a start from a neighbour's solution.
 
+#![allow(clippy::disallowed_methods, reason = "it decides no dot of a job")]
+
 use appearance::brdf::Space;
 use appearance::document::Surface;
 use appearance::gamut::{LIGHT, Printable};

@@ -5,6 +5,8 @@
 //! `lawson_hanson` is the textbook method on the same
 //! Gram matrix, which always starts cold.
 
+#![allow(clippy::disallowed_methods, reason = "it decides no dot of a job")]
+
 use appearance::brdf::{Space, Table};
 use appearance::document::Materials;
 use appearance::gamut::Printable;

@@ -4,6 +4,8 @@
 //! (`docs/decisions/metric-that-knows-light.md`). R/B is that of the printed reflectance at 60 degrees over the target's, on pixels
 //! that reflect less than .01/sr there: the least, the 5th and the 95th of a hundred, and the largest.
 
+#![allow(clippy::disallowed_methods, reason = "it decides no dot of a job")]
+
 use std::path::{Path, PathBuf};
 
 use appearance::brdf::{Space, Table, reflectances};

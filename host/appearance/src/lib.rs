@@ -5,6 +5,7 @@
 //! document reflect, [`sample`] drawn materials to try things on, and [`wide`] loops over lanes. [`document`] reads and writes files of materials,
 //! [`factor`] turns materials into bases and weights, [`gamut`] maps the bases to stacks of ink, [`edit`] changes them, and [`views`] makes a document of two pictures. Nothing
 //! here knows about dots, pages or printers.
+#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the standard mathematics"))]
 #![deny(unsafe_code)]
 #![allow(
     clippy::cast_possible_truncation,

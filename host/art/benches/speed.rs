@@ -4,6 +4,8 @@
 //! `pamditherbw -fs` on the same page in grey, both in processor time, and the ratios of each turn are shown. Linux only: the times
 //! are those of `/proc/self/stat`, in hundredths of a second.
 
+#![allow(clippy::disallowed_methods, reason = "it decides no dot of a job")]
+
 use std::io::Write;
 use std::process::{Command, Stdio};
 

@@ -8,6 +8,7 @@
 //! mixture.
 
 use super::intent::{Light, cross, dot, luminance, minus};
+use maths::Maths;
 
 /// Corners that lie in a plane up to this make no tetrahedron, and heights that differ by it are equal.
 const NEAR: f64 = 1e-9;
@@ -42,7 +43,7 @@ impl Tetrahedron {
 impl Even {
     /// Of stacks with these colours, between black and paper in linear light.
     pub fn new(points: &[Light]) -> Even {
-        let height = |p: Light| luminance(p).powi(2);
+        let height = |p: Light| luminance(p).squared();
         let n = points.len();
         let mut found = Vec::new();
         for a in 0..n {

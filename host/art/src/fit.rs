@@ -7,6 +7,7 @@
 //! Cost: 60 ms for a lattice, 20 ns a colour. Limits: the accuracy of colours is that of the ink library.
 
 use inks::Stack;
+use maths::Maths;
 
 use super::error::unfitted;
 use super::intent::Intent;
@@ -81,7 +82,7 @@ impl Fit {
             mix = lattice.even(mix, 0, printable).map_err(unfitted)?;
         }
         let of_drawings = intents.len() - 1;
-        let light = |level: f64| f64::from(srgb::decode(level.powf(1.0 / wishes.gamma) as f32));
+        let light = |level: f64| f64::from(srgb::decode(level.power(1.0 / wishes.gamma) as f32));
         for lattice in 0..intents.len() {
             let has_tints = wishes.intent == Intent::Auto && wishes.has_drawings && lattice == of_drawings;
             let tint = |node| if has_tints { Tint::of(node, near, light) } else { Tint::of_corner(node) };

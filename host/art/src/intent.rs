@@ -14,6 +14,7 @@
 //! Source: B. Ottosson, A perceptual color space for image processing (2020), through `palette`; J. Morovic, Color Gamut
 //! Mapping (2008), for the two families.
 
+use maths::Maths;
 use palette::convert::FromColorUnclamped;
 use palette::{LinSrgb, Oklab};
 use serde::Serialize;
@@ -119,7 +120,7 @@ impl Hull {
 
     fn compressed(&self, colour: Light) -> Light {
         let to = oklab(colour);
-        let saturation = to[1].hypot(to[2]) / SATURATED;
+        let saturation = to[1].hypotenuse(to[2]) / SATURATED;
         let grey = MIDDLE + AS_LIGHT * (to[0] - MIDDLE) / (1.0 + saturation * saturation);
         let ray = Ray { from: [grey, 0.0, 0.0], to };
         if ray.length() < 1e-6 {

@@ -9,6 +9,7 @@
 //! Cost: 60 ms for the fit, 20 ns a pixel. Limits: colours between nodes are as exact as the interpolation.
 
 use inks::Stack;
+use maths::Maths;
 use protocol::ink::Ink;
 use rayon::prelude::*;
 
@@ -285,7 +286,7 @@ impl Lattice {
         };
         let stacks: Vec<Light> = printable.curves.rows().map(body).collect();
         let hull = Hull::new(&stacks);
-        let level = |i: usize| (i as f64 / (NODES - 1) as f64).powf(1.0 / gamma);
+        let level = |i: usize| (i as f64 / (NODES - 1) as f64).power(1.0 / gamma);
         let level: [f64; NODES] =
             std::array::from_fn(|i| f64::from(appearance::srgb::decode(level(i) as f32)));
         let light = intents.iter().flat_map(|&intent| {

@@ -7,6 +7,7 @@
 //! combination of layers that occurs. The art gives the order of the inks; if it does not, the ink library's rules do.
 //! Cost: about a second for a page in three layers; see the modules. Limits: 16 layers, the largest page.
 //! [`Artwork::notes`] reports everything the readers had to assume.
+#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the standard mathematics"))]
 #![deny(unsafe_code)]
 #![allow(
     clippy::cast_possible_truncation,

@@ -4,6 +4,7 @@
 //! become layers if the options say so; whatever else is not white is colour.
 //! Cost: four bytes a pixel, and some nanoseconds. Limits: 8 bits a channel.
 
+use maths::Maths;
 use std::collections::{HashMap, HashSet};
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -73,8 +74,8 @@ pub(super) fn of(path: &Path, bytes: impl Read, page: Option<u32>) -> Result<Pix
 
 /// A value whose light has this power, in sRGB (IEC 61966-2-1).
 fn of_power(value: u8, gamma: f64) -> u8 {
-    let light = (f64::from(value) / 255.0).powf(1.0 / gamma);
-    let encoded = if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
+    let light = (f64::from(value) / 255.0).power(1.0 / gamma);
+    let encoded = if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.power(1.0 / 2.4) - 0.055 };
     (255.0 * encoded).round() as u8
 }
 

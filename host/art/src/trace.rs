@@ -9,6 +9,7 @@
 //! Source: T. Y. Zhang, C. Y. Suen, A fast parallel algorithm for thinning digital patterns, CACM 27 (1984); D. Douglas,
 //! T. Peucker, Cartographica 10 (1973).
 
+use maths::Maths;
 use std::collections::{HashMap, HashSet};
 
 use super::bitplane;
@@ -254,7 +255,7 @@ fn straightened(path: Path) -> Path {
     if closed {
         // A loop is two ways: to the point furthest from its first, and back.
         let from = points[0];
-        let far = |&(x, y): &(f64, f64)| (x - from.0).hypot(y - from.1);
+        let far = |&(x, y): &(f64, f64)| (x - from.0).hypotenuse(y - from.1);
         let apart =
             (0..points.len()).max_by(|&a, &b| far(&points[a]).total_cmp(&far(&points[b]))).unwrap_or(0);
         points.push(from);
@@ -278,9 +279,9 @@ fn reduced(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     while let Some((from, to)) = waiting.pop() {
         let ((ax, ay), (bx, by)) = (points[from], points[to]);
         let (dx, dy) = (bx - ax, by - ay);
-        let length = dx.hypot(dy);
+        let length = dx.hypotenuse(dy);
         let off = |&(x, y): &(f64, f64)| match length {
-            0.0 => (x - ax).hypot(y - ay),
+            0.0 => (x - ax).hypotenuse(y - ay),
             _ => (dx * (y - ay) - dy * (x - ax)).abs() / length,
         };
         let furthest = (from + 1..to).max_by(|&a, &b| off(&points[a]).total_cmp(&off(&points[b])));

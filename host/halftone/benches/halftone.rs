@@ -3,6 +3,8 @@
 //! Run `cargo bench --bench halftone`. The document is 1200 x 1593 pixels with eight smooth bases, so a pixel is
 //! 4 x 4 dots; every pixel has weight of every stack.
 
+#![allow(clippy::disallowed_methods, reason = "it decides no dot of a job")]
+
 use appearance::gamut::InkMix;
 use appearance::weights::{ONE, WeightMaps, quantise};
 use divan::Bencher;

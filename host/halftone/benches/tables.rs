@@ -1,5 +1,7 @@
 //! The tables of `docs/decisions/cells.md`: `cargo bench -p foilpress-halftone --bench tables -- methods`, `times` or `documents`.
 
+#![allow(clippy::disallowed_methods, reason = "it decides no dot of a job")]
+
 use appearance::brdf::{Space, reflectances};
 use appearance::gamut::InkMix;
 use appearance::weights::{ONE, WeightMaps, quantise};

@@ -10,6 +10,7 @@
 //! autocorrelation of 0.05 from chance.
 //! Source: R. Nasanen (1984) for the contrast sensitivity, exp(-f / (0.525 ln L + 3.91)), f in cycles per degree.
 
+use maths::Maths;
 use std::f64::consts::PI;
 
 use appearance::brdf::{Space, Table};
@@ -43,7 +44,7 @@ impl Tangent {
             columns
                 .map(|((f, mean), (c, weight))| {
                     let cubed = (mean * c).max(1e-6);
-                    weight * c * f / (3.0 * cubed.cbrt().powi(2))
+                    weight * c * f / (3.0 * cubed.cube_root().squared())
                 })
                 .collect()
         };
@@ -91,7 +92,7 @@ impl Tangent {
             // What the direction to a stack takes up, and its length, which decides where no stack in use is left.
             let taken = |q: usize| {
                 let own = length(&rest, q);
-                let sum = |(row, share): (&Vec<f64>, &f64)| share * dot(row, &rest[q]).powi(2);
+                let sum = |(row, share): (&Vec<f64>, &f64)| share * dot(row, &rest[q]).squared();
                 let all: f64 = rest.iter().zip(shares).map(sum).sum();
                 if own > least { (all / own, own) } else { (0.0, 0.0) }
             };
@@ -131,12 +132,12 @@ impl Tangent {
 
 /// Contrast sensitivity at `f` cycles per degree, 1 at 0.
 pub fn sensitivity(f: f64) -> f64 {
-    (-f / (0.525 * LUMINANCE.ln() + 3.91)).exp()
+    (-f / (0.525 * LUMINANCE.logarithm() + 3.91)).exponential()
 }
 
 /// How many metres a degree of the eye's view spans, so many metres away.
 pub fn degree(metres: f64) -> f64 {
-    2.0 * (PI / 360.0).tan() * metres
+    2.0 * (PI / 360.0).tangent() * metres
 }
 
 /// The eye's filter on windows of one size, from some distances.
@@ -154,8 +155,8 @@ impl Eye {
         let mut seen = Vec::with_capacity((width / 2 + 1) * (height / 2 + 1) * metres.len());
         for y in 0..=height / 2 {
             for x in 0..=width / 2 {
-                let f = (x as f64 / width as f64).hypot(y as f64 / height as f64);
-                seen.extend(metres.iter().map(|&metres| sensitivity(f * DOTS * degree(metres)).powi(2)));
+                let f = (x as f64 / width as f64).hypotenuse(y as f64 / height as f64);
+                seen.extend(metres.iter().map(|&metres| sensitivity(f * DOTS * degree(metres)).squared()));
             }
         }
         Eye { width, height, distances: metres.len(), seen }
@@ -236,7 +237,7 @@ pub fn peak(width: usize, index: &[u8], stack: u8, near: f64, far: usize) -> (f6
     let far = far as i32;
     for y in 0..=far {
         for x in -far..=far {
-            let lag = f64::from(x).hypot(f64::from(y));
+            let lag = f64::from(x).hypotenuse(f64::from(y));
             if lag <= near || lag > f64::from(far) {
                 continue;
             }
@@ -262,7 +263,7 @@ pub fn swing(width: usize, index: &[u8], stack: u8, side: usize) -> (f64, f64) {
     }
     let spread = |shares: &[f64], across: usize| {
         let mean = shares.iter().sum::<f64>() / shares.len() as f64;
-        let variance = shares.iter().map(|share| (share - mean).powi(2)).sum::<f64>() / shares.len() as f64;
+        let variance = shares.iter().map(|share| (share - mean).squared()).sum::<f64>() / shares.len() as f64;
         let independent = mean * (1.0 - mean) * side as f64 / across as f64;
         if independent > 0.0 { (variance / independent).sqrt() } else { 0.0 }
     };

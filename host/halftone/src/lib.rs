@@ -15,6 +15,7 @@
 //! Guarantees: every dot has a stack with weight in the document, or the one it is fixed to. No cluster of tones is smaller
 //! than its stack's minimum cluster, but for [`Method::Blue`], [`Method::Fine`] and where a whole region of tones is. The same input gives the same
 //! map on any machine with any number of threads.
+#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the standard mathematics"))]
 #![deny(unsafe_code)]
 #![allow(
     clippy::cast_possible_truncation,

@@ -7,6 +7,7 @@
 //! joining the runs of neighbouring rows. Cost: a few ns a dot, 20 ns a run for clusters. Memory: 12 bytes for each run of a row.
 
 use inks::Stack;
+use maths::Maths;
 use protocol::walk::{Tile, Walk};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -230,7 +231,7 @@ pub fn look(mix: &InkMix, dots: &DotMap, settings: &Settings) -> Result<Option<L
         .map(|corner| Window { field: &field, dots, corner, eye: &eye }.measure(&points, &solids, settings))
         .collect();
     let count = windows.len() as f64;
-    let mean = |eye: usize| (windows.iter().map(|w| w.seen[eye].powi(2)).sum::<f64>() / count).sqrt();
+    let mean = |eye: usize| (windows.iter().map(|w| w.seen[eye].squared()).sum::<f64>() / count).sqrt();
     let largest = |of: fn(&Measured) -> Option<f64>| windows.iter().filter_map(of).reduce(f64::max);
     let tones = windows.iter().map(|w| w.tones).sum::<u64>().max(1);
     Ok(Some(Look {

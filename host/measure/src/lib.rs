@@ -6,6 +6,8 @@
 //!
 //! [`compare`](mod@compare) lays photographs of a printed sheet over its prediction. [`scans`] reads from scans of charts what dots
 //! become and how a printer places and feeds.
+
+#![allow(clippy::disallowed_methods, reason = "a measurement is made once, and its file decides dots")]
 #![forbid(unsafe_code)]
 #![allow(
     clippy::cast_possible_truncation,

@@ -4,6 +4,7 @@
 //! [`chart`]. [`layout`] puts it on a page, [`separate`] splits the page into passes, and [`job`] plans the
 //! passes and writes them in the printer's language. [`simulate`] prints a job without a printer, [`inspect`] reads it, and
 //! [`preview`] shows it. [`pipeline`] is the way from dots to a job. Nothing here talks to a device.
+#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the standard mathematics"))]
 #![deny(unsafe_code)]
 #![allow(
     clippy::cast_possible_truncation,
@@ -20,6 +21,7 @@ pub mod inspect;
 pub mod job;
 pub mod layout;
 pub mod pipeline;
+#[allow(clippy::disallowed_methods, reason = "pictures decide no dot; what does, forbids them again")]
 pub mod preview;
 pub mod separate;
 pub mod simulate;

@@ -324,7 +324,7 @@ fn icon() -> Vec<u8> {
     const SIDE: u32 = 128;
     let picture = image::RgbImage::from_fn(SIDE, SIDE, |x, y| {
         let (dx, dy) = (f64::from(x) - 64.0, f64::from(y) - 70.0);
-        let leaf = dx.abs() < 26.0 * (1.0 - (dy / 40.0).powi(2)).max(0.0);
+        let leaf = dx.abs() < 26.0 * (1.0 - (dy / 40.0) * (dy / 40.0)).max(0.0);
         match (12..116).contains(&x) && (6..122).contains(&y) {
             true if leaf && dx.abs() > 1.5 => image::Rgb([225, 160, 0]),
             true => image::Rgb([250, 250, 246]),

@@ -7,6 +7,7 @@
 //! Each preset is a printer of its own, for dialogs show no vendor's options ([`template`]). What is drawn and how it is sent is what
 //! print queues do: this crate adds the protocol, jobs that outlive it, who may do what ([`access`]), and how dialogs find it ([`advert`]).
 //! Source: PWG 5100.14 (IPP Everywhere), RFC 8010 and 8011 (IPP), RFC 9110 and 9112 (HTTP).
+#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the standard mathematics"))]
 #![forbid(unsafe_code)]
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation, clippy::cast_sign_loss))]
 

@@ -6,6 +6,7 @@
 //! Cost: stacks^2 x 4096 at worst, 0.1 s for 256. Limits: false colours, not a preview.
 
 use inks::Stack;
+use maths::Maths;
 use protocol::ink::{Ink, Kind};
 
 /// Distance at which two colours are easily told apart, in steps of 1/255.
@@ -79,7 +80,7 @@ fn look(stack: &Stack, ground: [f64; 3], tint: impl Fn(Ink) -> [f64; 3]) -> [f64
 /// Redmean, a weighted distance in RGB near enough to what the eye sees for labels.
 fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     let red = (a[0] + b[0]) / 2.0 / 256.0;
-    let d: [f64; 3] = std::array::from_fn(|c| (a[c] - b[c]).powi(2));
+    let d: [f64; 3] = std::array::from_fn(|c| (a[c] - b[c]).squared());
     (((2.0 + red) * d[0] + 4.0 * d[1] + (3.0 - red) * d[2]) / 3.0).sqrt()
 }
 

@@ -3,6 +3,7 @@
 //! Halftoned documents, layers and charts are dot maps; the layout repeats, mirrors, marks and places a dot map on a
 //! page. Everything after that knows only sheets.
 
+#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the standard mathematics"))]
 #![deny(unsafe_code)]
 #![allow(
     clippy::cast_possible_truncation,

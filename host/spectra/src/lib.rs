@@ -6,6 +6,9 @@
 //! Cost: n log n for a plane of n numbers. Memory: see each function. Limits: numbers of 32 bits, for a second width doubles the code, which is a
 //! tenth of the program; results are right to some 1e-6 of the largest. Sides with small prime factors are fast ([`fast_side`]). Transforms are not scaled: forth and back multiplies by the number of values.
 
+#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the standard mathematics"))]
+
+use maths::Maths;
 use rayon::prelude::*;
 use rustfft::FftPlanner;
 pub use rustfft::num_complex::Complex;
@@ -62,7 +65,7 @@ pub fn filter(plane: &mut [Complex<f32>], width: usize, rows: usize, response: &
             forward[1].process(column);
             let fx = cycles(left + x, width);
             for (y, value) in column.iter_mut().enumerate() {
-                *value *= (response(fx.hypot(cycles(y, height))) / whole) as f32;
+                *value *= (response(fx.hypotenuse(cycles(y, height))) / whole) as f32;
             }
             back[1].process(column);
         });

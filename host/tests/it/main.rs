@@ -1,5 +1,7 @@
 //! The program as its users run it, a module for each subject.
 
+#![allow(clippy::disallowed_methods, reason = "tests compare with the standard mathematics")]
+
 #[cfg(unix)]
 mod art;
 mod bad_input;

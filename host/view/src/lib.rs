@@ -6,6 +6,8 @@
 //! [`Lit::with_dot_gain`] adds what light does inside the paper, [`Renderer::seen_from`] what an eye does at a distance. [`display`] lays a screen over a printed grid of stacks and shows what is seen.
 //! Units: metres, radians; x points right, y up, z to the eye that looks straight at the sheet. The origin is the middle of
 //! the sheet. Radiance is that of a surface under irradiance 1 where it faces the light, linear Rec. 709.
+
+#![allow(clippy::disallowed_methods, reason = "pictures decide no dot; what does, forbids them again")]
 #![forbid(unsafe_code)]
 #![allow(
     clippy::cast_possible_truncation,

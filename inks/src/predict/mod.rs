@@ -14,6 +14,7 @@
 mod figures;
 mod least_squares;
 
+use maths::Maths;
 use std::f64::consts::FRAC_PI_2;
 
 use protocol::ink::Kind;
@@ -73,7 +74,7 @@ struct Data {
 }
 
 fn log(rgb: [f64; 3]) -> [f64; 3] {
-    rgb.map(|v| (v.max(0.0) + FLOOR).ln())
+    rgb.map(|v| (v.max(0.0) + FLOOR).logarithm())
 }
 
 /// The measured curves of a library.
@@ -95,7 +96,7 @@ fn measured(library: &Library) -> Vec<Data> {
                 let stated = entry.uncertainty.as_ref().map_or([0.0; 3], |u| u.sigma()[i]);
                 data.theta.push(curve.theta()[i]);
                 data.log.push(log(rgb));
-                data.sigma.push(std::array::from_fn(|c| MISFIT.hypot(stated[c] / (rgb[c] + FLOOR))));
+                data.sigma.push(std::array::from_fn(|c| MISFIT.hypotenuse(stated[c] / (rgb[c] + FLOOR))));
             }
             data
         })
@@ -130,14 +131,14 @@ fn fit(from: &Optics, data: &[&Data], start: Option<&Fitted>) -> Result<Fitted, 
         optics.lobes(&d.stack)?;
     }
     let values: Vec<f64> = slots.iter().map(|slot| slot.get(&mut optics).unwrap_or(1.0)).collect();
-    let bounds: Vec<[f64; 2]> = slots.iter().map(|slot| slot.range().map(f64::ln)).collect();
-    let prior: Vec<f64> = values.iter().map(|v| v.max(1e-12).ln()).collect();
+    let bounds: Vec<[f64; 2]> = slots.iter().map(|slot| slot.range().map(f64::logarithm)).collect();
+    let prior: Vec<f64> = values.iter().map(|v| v.max(1e-12).logarithm()).collect();
     let spread: Vec<f64> = slots.iter().zip(&values).map(|(slot, &v)| slot.spread(v)).collect();
     let known = |slot: &Slot| start.and_then(|s| s.slots.iter().position(|k| k == slot).map(|i| s.x[i]));
     let x: Vec<f64> = slots.iter().zip(&prior).map(|(slot, &p)| known(slot).unwrap_or(p)).collect();
     // The numbers that each curve depends on.
     let active: Vec<Vec<usize>> = data.iter().map(|d| depends(from, &slots, &d.stack)).collect();
-    let priors = |x: &[f64]| -> f64 { (0..x.len()).map(|i| ((x[i] - prior[i]) / spread[i]).powi(2)).sum() };
+    let priors = |x: &[f64]| -> f64 { (0..x.len()).map(|i| ((x[i] - prior[i]) / spread[i]).squared()).sum() };
     let cost = |x: &[f64]| {
         let mut optics = optics.clone();
         put(&mut optics, &slots, x);
@@ -150,8 +151,8 @@ fn fit(from: &Optics, data: &[&Data], start: Option<&Fitted>) -> Result<Fitted, 
         let n = x.len();
         let mut found = Normal { cost: 0.5 * priors(x), gradient: vec![0.0; n], curvature: Matrix::zero(n) };
         for i in 0..n {
-            found.gradient[i] = (x[i] - prior[i]) / spread[i].powi(2);
-            *found.curvature.at_mut(i, i) = spread[i].powi(-2);
+            found.gradient[i] = (x[i] - prior[i]) / spread[i].squared();
+            *found.curvature.at_mut(i, i) = spread[i].whole_power(-2);
         }
         for (d, active) in data.iter().zip(&active) {
             let Ok(r) = residuals(&optics, d) else { continue };
@@ -194,7 +195,7 @@ fn depends(optics: &Optics, slots: &[Slot], stack: &Stack) -> Vec<usize> {
 
 fn put(optics: &mut Optics, slots: &[Slot], x: &[f64]) {
     for (slot, x) in slots.iter().zip(x) {
-        slot.set(optics, x.exp());
+        slot.set(optics, x.exponential());
     }
 }
 
@@ -212,11 +213,11 @@ fn residuals(optics: &Optics, data: &Data) -> Result<Vec<f64>, ModelError> {
 /// The derivative of the logarithm of a stack's curve by the logarithm of a number whose logarithm is `x`.
 fn slopes(optics: &mut Optics, slot: Slot, x: f64, stack: &Stack, theta: &[f64]) -> Vec<[f64; 3]> {
     let mut at = |x: f64| {
-        slot.set(optics, x.exp());
+        slot.set(optics, x.exponential());
         modelled(optics, stack, theta)
     };
     let both = (at(x + STEP), at(x - STEP));
-    slot.set(optics, x.exp());
+    slot.set(optics, x.exponential());
     let (Ok(above), Ok(below)) = both else { return vec![[0.0; 3]; theta.len()] };
     let slope = |(a, b): (&[f64; 3], &[f64; 3])| std::array::from_fn(|c| (a[c] - b[c]) / (2.0 * STEP));
     above.iter().zip(&below).map(slope).collect()
@@ -373,7 +374,7 @@ impl Misfit {
         let mut sums = [0.0; 5];
         for e in stacks.iter().flat_map(|(_, excess)| excess) {
             let (x, y) = (e.filtered * e.filtered, e.off - e.known);
-            let weight = (e.known + MISFIT * MISFIT).powi(-2);
+            let weight = (e.known + MISFIT * MISFIT).whole_power(-2);
             [1.0, x, y, x * x, x * y].into_iter().zip(&mut sums).for_each(|(v, sum)| *sum += weight * v);
         }
         let [_, x, y, xx, xy] = sums.map(|sum| sum / sums[0]);
@@ -404,7 +405,7 @@ fn filtered(optics: &Optics, stack: &Stack, theta: &[f64]) -> Result<Vec<[f64; 3
 /// The root mean square of the relative differences between a model and a measurement.
 fn error(optics: &Optics, data: &Data) -> Result<f64, ModelError> {
     let model = modelled(optics, &data.stack, &data.theta)?;
-    let squares = model.iter().zip(&data.log).flat_map(|(m, f)| (0..3).map(move |c| (m[c] - f[c]).powi(2)));
+    let squares = model.iter().zip(&data.log).flat_map(|(m, f)| (0..3).map(move |c| (m[c] - f[c]).squared()));
     Ok((squares.sum::<f64>() / (3 * data.theta.len()).max(1) as f64).sqrt())
 }
 
@@ -463,7 +464,7 @@ impl Library {
 
 /// Angles of a predicted curve: the square-root grid from 0 to 87 degrees.
 fn grid() -> Vec<f64> {
-    (0..SAMPLES).map(|n| FRAC_PI_2 * (f64::from(n) / f64::from(SAMPLES)).powi(2)).collect()
+    (0..SAMPLES).map(|n| FRAC_PI_2 * (f64::from(n) / f64::from(SAMPLES)).squared()).collect()
 }
 
 impl Fitted {
@@ -490,9 +491,9 @@ impl Fitted {
         let spread = self.spread(from, &data.stack, &data.theta);
         let filtered = filtered(&self.optics, &data.stack, &data.theta)?;
         let at = |k: usize, c: usize| Excess {
-            off: (model[k][c] - data.log[k][c]).powi(2),
-            known: spread[k][c].powi(2) + data.sigma[k][c].powi(2),
-            measured: data.sigma[k][c].powi(2),
+            off: (model[k][c] - data.log[k][c]).squared(),
+            known: spread[k][c].squared() + data.sigma[k][c].squared(),
+            measured: data.sigma[k][c].squared(),
             filtered: filtered[k][c],
         };
         let excess: Vec<Excess> = (0..data.theta.len()).flat_map(|k| (0..3).map(move |c| at(k, c))).collect();
@@ -513,7 +514,7 @@ impl Fitted {
         let filtered = filtered(&self.optics, stack, &theta)?;
         let sigma = |k: usize| {
             std::array::from_fn(|c| {
-                spread[k][c].hypot(misfit.at(stack, filtered[k][c])) * (curve.rgb()[k][c] + FLOOR)
+                spread[k][c].hypotenuse(misfit.at(stack, filtered[k][c])) * (curve.rgb()[k][c] + FLOOR)
             })
         };
         let sigma = (0..theta.len()).map(sigma).collect();
@@ -534,7 +535,7 @@ impl Fitted {
                 FittedFigure {
                     name: self.slots[i].name(),
                     before: was,
-                    value: self.x[i].exp(),
+                    value: self.x[i].exponential(),
                     uncertainty: self.scale * dot(&y, &y).sqrt(),
                     uncertainty_before: self.slots[i].spread(was),
                 }

@@ -26,6 +26,7 @@ fn run() -> Result<(), Box<dyn std::error::Error>> {
     port.one_way.store(true, Ordering::Relaxed);
     let (bridge, address) = Bridge::on_tcp(([127, 0, 0, 1], 0).into(), port)?;
     println!("{address}");
+    #[expect(clippy::disallowed_methods, reason = "the words are our own")]
     std::io::stdout().flush()?;
     std::io::stdin().read_to_end(&mut Vec::new())?;
     let printed = bridge.printed();

@@ -1,5 +1,7 @@
 //! Everything joined, a module for each scenario.
 
+#![allow(clippy::disallowed_methods, reason = "tests compare with the standard mathematics")]
+
 mod bridge;
 mod corpora;
 mod documents;

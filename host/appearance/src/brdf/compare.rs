@@ -8,6 +8,7 @@
 //! exact, and so does a model; where neither has any, there is no verdict.
 
 use inks::Entry;
+use maths::Maths;
 use serde::Serialize;
 
 use super::space::Space;
@@ -56,7 +57,7 @@ pub fn compare(space: &Space, a: &Entry, b: &Entry) -> Difference {
         let seen = known.iter().all(|u| u.is_measured(theta));
         for channel in 0..3 {
             let (x, y) = (first[3 * n + channel], second[3 * n + channel]);
-            let sigma = BAND * known.iter().map(|u| u.at(theta)[channel].powi(2)).sum::<f64>().sqrt();
+            let sigma = BAND * known.iter().map(|u| u.at(theta)[channel].squared()).sum::<f64>().sqrt();
             middle.push(0.5 * (x + y));
             above.push(0.5 * (x + y) + sigma);
             if seen {
@@ -64,7 +65,7 @@ pub fn compare(space: &Space, a: &Entry, b: &Entry) -> Difference {
                 inside += usize::from((x - y).abs() <= sigma);
             }
             let ratio = y.max(1e-9) / x.max(1e-9);
-            if theta.to_degrees() <= WIDEST && ratio.ln().abs() > largest.ratio.ln().abs() {
+            if theta.to_degrees() <= WIDEST && ratio.logarithm().abs() > largest.ratio.logarithm().abs() {
                 largest = Largest { theta_deg: theta.to_degrees(), channel, ratio };
             }
         }

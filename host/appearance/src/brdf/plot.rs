@@ -4,6 +4,7 @@
 //! differ by a factor of a hundred. Values below a millionth of the largest are drawn at that floor.
 
 use inks::{Curve, Uncertainty};
+use maths::Maths;
 use plotters::prelude::*;
 use textplots::{Chart, ColorPlot, LabelBuilder, LabelFormat, Plot, Shape, TickDisplay, TickDisplayBuilder};
 
@@ -27,8 +28,8 @@ const INKS: [Rgb; 3] = [(224, 64, 64), (48, 168, 80), (72, 112, 240)];
 fn decades<'a>(curves: impl Iterator<Item = &'a Curve> + Clone) -> (i32, i32) {
     let values =
         || curves.clone().flat_map(|curve| curve.rgb().iter().flatten().copied()).filter(|v| *v > 0.0);
-    let most = values().fold(1e-12, f64::max).log10().ceil() as i32;
-    let least = values().fold(f64::MAX, f64::min).log10().floor() as i32;
+    let most = values().fold(1e-12, f64::max).logarithm10().ceil() as i32;
+    let least = values().fold(f64::MAX, f64::min).logarithm10().floor() as i32;
     (least.clamp(most - 6, most - 3), most)
 }
 
@@ -38,7 +39,7 @@ fn points(curve: &Curve, channel: usize, (least, most): (i32, i32)) -> Vec<(f64,
         .map(|n| f64::from(n) / 8.0)
         .map(|degrees| {
             let value = curve.at(degrees.to_radians())[channel];
-            (degrees, value.max(1e-300).log10().clamp(f64::from(least), f64::from(most)))
+            (degrees, value.max(1e-300).logarithm10().clamp(f64::from(least), f64::from(most)))
         })
         .collect()
 }
@@ -69,7 +70,7 @@ fn framed(range: (i32, i32), shapes: &[(&Shape<'_>, Option<Rgb>)]) -> String {
     let mut chart = Chart::new_with_y_range(width, height, 0.0, 90.0, range.0 as f32, range.1 as f32);
     let mut chart: &mut Chart<'_> = chart
         .x_label_format(LabelFormat::Custom(Box::new(|degrees| format!("{degrees:.0} deg"))))
-        .y_label_format(LabelFormat::Custom(Box::new(|decade| number(10f64.powf(f64::from(decade))))))
+        .y_label_format(LabelFormat::Custom(Box::new(|decade| number(10f64.power(f64::from(decade))))))
         .y_tick_display(TickDisplay::Sparse);
     for (shape, colour) in shapes {
         chart = match *colour {
@@ -100,7 +101,7 @@ pub fn terminal_change(before: &Curve, after: &Curve) -> String {
 
 /// A reflectance with at most two significant digits.
 fn number(value: f64) -> String {
-    let decimals = 1 - value.max(1e-300).log10().floor() as i32;
+    let decimals = 1 - value.max(1e-300).logarithm10().floor() as i32;
     if decimals > 5 {
         return format!("{value:.0e}");
     }
@@ -135,7 +136,7 @@ pub fn compared(title: &str, lines: &[Line<'_>]) -> Result<String, PlotError> {
 
 fn draw(text: &mut String, title: &str, lines: &[Line<'_>]) -> Result<(), Box<dyn std::error::Error>> {
     let (least, most) = decades(lines.iter().map(|line| line.curve));
-    let (low, high) = (10f64.powi(least), 10f64.powi(most));
+    let (low, high) = (10f64.whole_power(least), 10f64.whole_power(most));
     let area = SVGBackend::with_string(text, (720, 480)).into_drawing_area();
     area.fill(&WHITE)?;
     let mut chart = ChartBuilder::on(&area)
@@ -169,7 +170,7 @@ fn draw(text: &mut String, title: &str, lines: &[Line<'_>]) -> Result<(), Box<dy
                 chart.draw_series(std::iter::once(Polygon::new(band, colour.mix(0.18).filled())))?;
             }
             let points = points(line.curve, channel, (least, most)).into_iter();
-            let points = points.map(|(x, y)| (x, 10f64.powf(y)));
+            let points = points.map(|(x, y)| (x, 10f64.power(y)));
             if place == 0 {
                 chart.draw_series(LineSeries::new(points, colour.stroke_width(2)))?;
             } else {

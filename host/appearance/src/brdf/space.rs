@@ -11,6 +11,7 @@
 //! quadrature.
 //! Cost: O(columns) per distance. Limits: values below 0 count as 0; cube roots of radiance do not add, only reflectance does.
 
+use maths::Maths;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use inks::Curve;
@@ -65,12 +66,12 @@ impl Space {
             let u = (n as f64 + 0.5) / samples as f64;
             let theta = FRAC_PI_2 * u * u;
             let dtheta = FRAC_PI_2 * 2.0 * u / samples as f64;
-            cosine.push(theta.cos());
-            measure.push(dtheta * theta.sin() * theta.cos());
+            cosine.push(theta.cosine());
+            measure.push(dtheta * theta.sine() * theta.cosine());
             angles.push(theta);
         }
         // 4 sin 2t cos 2t = 8 sin t cos t cos 2t up to 45 degrees, by the same rule.
-        let light = measure.iter().zip(&angles).map(|(&m, &t)| 8.0 * m * (2.0 * t).cos());
+        let light = measure.iter().zip(&angles).map(|(&m, &t)| 8.0 * m * (2.0 * t).cosine());
         let light = light.take_while(|&q: &f64| q > 0.0).collect();
         let beyond = |&t: &f64| if t > DARK { 1.0 } else { 0.0 };
         let all: f64 = measure.iter().zip(&angles).map(|(m, t)| m * beyond(t)).sum();
@@ -140,7 +141,7 @@ impl Space {
         let mut sum = 0.0;
         for (j, (&a, &b)) in a.iter().zip(b).enumerate() {
             let c = self.radiance[j];
-            let d = self.weight[j] * ((a.max(0.0) * c).cbrt() - (b.max(0.0) * c).cbrt());
+            let d = self.weight[j] * ((a.max(0.0) * c).cube_root() - (b.max(0.0) * c).cube_root());
             sum += d * d;
         }
         sum.sqrt()
@@ -170,13 +171,13 @@ impl Space {
     /// How far two rows differ in the light that they return: the distance between the cube roots of their albedos.
     pub fn light_distance<T: Copy + Into<f64>>(&self, a: &[T], b: &[T]) -> f64 {
         let both = self.albedo(a).into_iter().zip(self.albedo(b));
-        both.map(|(a, b)| (a.cbrt() - b.cbrt()).powi(2)).sum::<f64>().sqrt()
+        both.map(|(a, b)| (a.cube_root() - b.cube_root()).squared()).sum::<f64>().sqrt()
     }
 
     /// A row of reflectance in 1/sr transformed so that [`Space::distance`] is the Euclidean distance between two results.
     pub(crate) fn seen(&self, row: &[f64]) -> Vec<f64> {
         let columns = row.iter().zip(self.radiance.iter().zip(&self.weight));
-        columns.map(|(&f, (&c, &weight))| weight * (f.max(0.0) * c).cbrt()).collect()
+        columns.map(|(&f, (&c, &weight))| weight * (f.max(0.0) * c).cube_root()).collect()
     }
 }
 

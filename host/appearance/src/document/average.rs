@@ -7,6 +7,7 @@
 //! Limits: dependence on theta_d is lost (metals: factors up to two at the peak). Angles that no pair of directions
 //! reaches are left out; the curve keeps its last value there.
 
+use maths::Maths;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use inks::Curve;
@@ -20,9 +21,9 @@ pub type Direction = [f64; 3];
 /// The two directions of half-angle coordinates (radians) with phi_h = 0, by symmetry: `wi` is d rotated by theta_h about
 /// the y axis, and `wo = 2 (wi . h) h - wi`.
 fn directions(theta_h: f64, theta_d: f64, phi_d: f64) -> (Direction, Direction) {
-    let (sh, ch) = theta_h.sin_cos();
-    let (sd, cd) = theta_d.sin_cos();
-    let (sp, cp) = phi_d.sin_cos();
+    let (sh, ch) = theta_h.sine_cosine();
+    let (sd, cd) = theta_d.sine_cosine();
+    let (sp, cp) = phi_d.sine_cosine();
     let d = [sd * cp, sd * sp, cd];
     let wi = [ch * d[0] + sh * d[2], d[1], ch * d[2] - sh * d[0]];
     let h = [sh, 0.0, ch];
@@ -51,7 +52,7 @@ pub fn curve(
             }
             for p in 0..phi_d_cells {
                 let (wi, wo) = directions(th, td, (p as f64 + 0.5) / phi_d_cells as f64 * PI);
-                let weight = wi[2] * wo[2] * td.sin();
+                let weight = wi[2] * wo[2] * td.sine();
                 if wi[2] <= 0.0 || wo[2] <= 0.0 {
                     continue;
                 }

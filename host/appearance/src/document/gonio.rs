@@ -9,6 +9,7 @@
 //! Cost: one pass. Limits: how densely an instrument sampled decides what a cell averages; a table need not be even, so dependence
 //! on the difference angle is lost unevenly. Cells without measurements are left out.
 
+use maths::Maths;
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
@@ -149,12 +150,13 @@ impl Cell {
 
 /// Cell, weight and half angle of a measurement; `None` if it is not averaged.
 fn placed([theta_i, phi_i, theta_o, phi_o]: [f64; 4]) -> Option<(usize, f64, f64)> {
-    let direction = |theta: f64, phi: f64| [theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()];
+    let direction =
+        |theta: f64, phi: f64| [theta.sine() * phi.cosine(), theta.sine() * phi.sine(), theta.cosine()];
     let (wi, wo) = (direction(theta_i, phi_i), direction(theta_o, phi_o));
     let sum: [f64; 3] = std::array::from_fn(|k| wi[k] + wo[k]);
-    let theta_h = sum[0].hypot(sum[1]).atan2(sum[2]);
+    let theta_h = sum[0].hypotenuse(sum[1]).arctangent2(sum[2]);
     let cos: f64 = wi.iter().zip(wo).map(|(a, b)| a * b).sum();
-    let theta_d = 0.5 * cos.clamp(-1.0, 1.0).acos().to_degrees();
+    let theta_d = 0.5 * cos.clamp(-1.0, 1.0).arccosine().to_degrees();
     let weight = wi[2] * wo[2];
     if !((THETA_D.0..=THETA_D.1).contains(&theta_d) && wi[2] > 0.0 && wo[2] > 0.0 && weight.is_finite()) {
         return None;
@@ -177,9 +179,11 @@ pub(super) mod tests {
                 for p in 0..12 {
                     let phi = f64::from(p) * 30f64.to_radians();
                     // The half angle by spherical trigonometry: another way than the reader's.
-                    let cos_io = theta_i.cos() * theta_o.cos() + theta_i.sin() * theta_o.sin() * phi.cos();
-                    let cos_h = (theta_i.cos() + theta_o.cos()) / (2.0 + 2.0 * cos_io).max(1e-12).sqrt();
-                    let v = f(cos_h.clamp(-1.0, 1.0).acos(), 0.5 * cos_io.clamp(-1.0, 1.0).acos());
+                    let cos_io =
+                        theta_i.cosine() * theta_o.cosine() + theta_i.sine() * theta_o.sine() * phi.cosine();
+                    let cos_h =
+                        (theta_i.cosine() + theta_o.cosine()) / (2.0 + 2.0 * cos_io).max(1e-12).sqrt();
+                    let v = f(cos_h.clamp(-1.0, 1.0).arccosine(), 0.5 * cos_io.clamp(-1.0, 1.0).arccosine());
                     text += &format!("{theta_i} 0.5 {theta_o} {} {v} {v} {v}\n", 0.5 + phi);
                 }
             }

@@ -5,6 +5,7 @@
 //! Reflectance in 1/sr is the stored number times 1, 1.15 and 1.66 over 1500. Negative numbers mark cells that were not
 //! measured; they are left out of the average. [`super::average`] computes the curve.
 
+use maths::Maths;
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
@@ -79,7 +80,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<inks::Curve, DocumentEr
         ));
     }
     let theta_h: Vec<f64> =
-        (0..heights).map(|i| FRAC_PI_2 * ((i as f64 + 0.5) / heights as f64).powi(2)).collect();
+        (0..heights).map(|i| FRAC_PI_2 * ((i as f64 + 0.5) / heights as f64).squared()).collect();
     average::curve(&theta_h, differences, azimuths, |[h, d, p], _, _| {
         let cell = p + azimuths * (d + differences * h);
         let rgb: [f64; 3] = std::array::from_fn(|c| stored(cell + c * cells));

@@ -3,6 +3,7 @@
 //! The contents of a file decide its format; a name that disagrees gives a note. Targa has no signature: its name decides. Dimensions are checked before anything of
 //! that size is allocated. Floating-point images must be finite.
 
+use maths::Maths;
 use std::path::Path;
 
 use image::{DynamicImage, ImageFormat};
@@ -73,7 +74,7 @@ impl Encoding {
         match self {
             Encoding::Linear => v,
             Encoding::Srgb => srgb::decode(v),
-            Encoding::Power(power) => v.max(0.0).powf((1.0 / power) as f32),
+            Encoding::Power(power) => v.max(0.0).power((1.0 / power) as f32),
         }
     }
 }

@@ -11,6 +11,7 @@
 //! Source: filtering of slope moments in rendering, as in Olano & Baker 2010 (LEAN mapping).
 
 use super::texture::Plane;
+use maths::Maths;
 
 /// Side of the window in pixels: about a millimetre if the document fills the page.
 pub const WINDOW: usize = 7;
@@ -67,7 +68,7 @@ pub fn slope_variance(x: &Plane, y: &Plane, scale: f32, radius: usize) -> Plane 
                 }
                 let across = (x + radius + 1).min(width) - x.saturating_sub(radius);
                 let n = (rows * across) as f64;
-                let both = sum[2] / n - (sum[0] / n).powi(2) - (sum[1] / n).powi(2);
+                let both = sum[2] / n - (sum[0] / n).squared() - (sum[1] / n).squared();
                 *out = (0.5 * both).max(0.0) as f32;
             }
         }

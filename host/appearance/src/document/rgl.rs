@@ -9,6 +9,7 @@
 //! Spectra become RGB as in [`super::spectrum`].
 //! Cost: about a million lookups. Limits: isotropic files only (phi_i of at most two entries).
 
+use maths::Maths;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
@@ -36,7 +37,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<inks::Curve, DocumentEr
     let file = TensorFile::parse(bytes, path)?;
     let measured = Measured::new(&file)?;
     let theta_h: Vec<f64> =
-        (0..THETA_H).map(|i| FRAC_PI_2 * ((i as f64 + 0.5) / THETA_H as f64).powi(2)).collect();
+        (0..THETA_H).map(|i| FRAC_PI_2 * ((i as f64 + 0.5) / THETA_H as f64).squared()).collect();
     average::curve(&theta_h, CELLS.0, CELLS.1, |_, wi, wo| measured.reflectance(wi, wo))
         .ok_or_else(|| file.wrong("theta_i", "no pair of directions within its range can be averaged".into()))
 }
@@ -181,14 +182,14 @@ impl Measured {
 
     /// Reflectance in 1/sr; `None` beyond the measured angles.
     fn reflectance(&self, wi: average::Direction, wo: average::Direction) -> Option<[f64; 3]> {
-        let theta_i = wi[2].clamp(-1.0, 1.0).acos();
+        let theta_i = wi[2].clamp(-1.0, 1.0).arccosine();
         let last = *self.theta_i.last()?;
         if theta_i > last.max(1e-6) + 1e-6 && self.theta_i.len() > 1 {
             return None;
         }
         let m: [f64; 3] = std::array::from_fn(|k| wi[k] + wo[k]);
-        let theta_m = (m[0] * m[0] + m[1] * m[1]).sqrt().atan2(m[2]);
-        let phi = m[1].atan2(m[0]) - wi[1].atan2(wi[0]);
+        let theta_m = (m[0] * m[0] + m[1] * m[1]).sqrt().arctangent2(m[2]);
+        let phi = m[1].arctangent2(m[0]) - wi[1].arctangent2(wi[0]);
         let u = (2.0 * theta_m / PI).sqrt();
         let v = (phi + PI) / (2.0 * PI);
         let v = v - v.floor();
@@ -203,7 +204,7 @@ impl Measured {
         let scale = if self.factor_outside {
             let grid =
                 |t: &Tensor, u, v| Grid { width: t.shape[1], height: t.shape[0], data: &t.data }.at(u, v);
-            let phi_i = wi[1].atan2(wi[0]);
+            let phi_i = wi[1].arctangent2(wi[0]);
             let sigma = grid(&self.sigma, (2.0 * theta_i / PI).sqrt(), (phi_i + PI) / (2.0 * PI));
             if sigma <= 0.0 {
                 return None;
@@ -338,9 +339,9 @@ pub(super) mod tests {
                 .map(|i| f((i % w) as f64 / (w - 1) as f64, (i / w) as f64 / (h - 1) as f64) as f32)
                 .collect()
         };
-        let ndf = grid(2, 600, &|u, _| inks::ggx::distribution(theta(u).cos(), ALPHA));
+        let ndf = grid(2, 600, &|u, _| inks::ggx::distribution(theta(u).cosine(), ALPHA));
         // The projected area of Smith's GGX facets, cos / G1.
-        let area = |t: f64| 0.5 * t.cos() * (1.0 + (1.0 + (ALPHA * t.tan()).powi(2)).sqrt());
+        let area = |t: f64| 0.5 * t.cosine() * (1.0 + (1.0 + (ALPHA * t.tangent()).squared()).sqrt());
         let sigma = grid(2, 600, &|u, _| area(theta(u).min(1.55)));
         let mut vndf = Vec::new();
         for _ in 0..n {
@@ -376,10 +377,10 @@ pub(super) mod tests {
     fn expected(level: [f64; 3]) -> inks::Curve {
         let theta_h: Vec<f64> = (0..THETA_H).map(|i| theta((i as f64 + 0.5) / THETA_H as f64)).collect();
         average::curve(&theta_h, CELLS.0, CELLS.1, |[h, ..], wi, wo| {
-            let t = wi[2].acos();
-            let area = 0.5 * t.cos() * (1.0 + (1.0 + (ALPHA * t.tan()).powi(2)).sqrt());
+            let t = wi[2].arccosine();
+            let area = 0.5 * t.cosine() * (1.0 + (1.0 + (ALPHA * t.tangent()).squared()).sqrt());
             let u = (2.0 * theta_h[h] / PI).sqrt();
-            let d = inks::ggx::distribution(theta_h[h].cos(), ALPHA);
+            let d = inks::ggx::distribution(theta_h[h].cosine(), ALPHA);
             (t <= 1.5).then(|| level.map(|f0| f0 * (1.0 - 0.5 * u) * d / (4.0 * area * wo[2])))
         })
         .unwrap()

@@ -4,6 +4,8 @@
 //! that a flat 1 is (1, 1, 1). Cost: a few exponentials a wavelength. Limits: a spectrum of few wavelengths is what its samples are,
 //! nothing between.
 
+use maths::Maths;
+
 /// For each wavelength (nm, ascending), its weights in linear Rec. 709 red, green and blue. The weights of each colour sum
 /// to one. `None` unless the wavelengths cover the visible range and lie within it.
 pub fn rgb_weights(wavelengths: &[f32]) -> Option<Vec<[f64; 3]>> {
@@ -35,7 +37,7 @@ pub fn rgb_weights(wavelengths: &[f32]) -> Option<Vec<[f64; 3]>> {
 fn matching(nm: f64) -> [f64; 3] {
     let lobe = |centre: f64, below: f64, above: f64| {
         let t = (nm - centre) / if nm < centre { below } else { above };
-        (-0.5 * t * t).exp()
+        (-0.5 * t * t).exponential()
     };
     [
         1.056 * lobe(599.8, 37.9, 31.0) + 0.362 * lobe(442.0, 16.0, 26.7) - 0.065 * lobe(501.1, 20.4, 26.2),

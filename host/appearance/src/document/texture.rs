@@ -6,6 +6,7 @@
 //! value: dark colours and small variances need the finer steps.
 //! Cost: 1, 2 or 4 bytes a pixel, and one look-up a value.
 
+use maths::Maths;
 use rayon::prelude::*;
 
 /// The numbers as they are stored.
@@ -70,7 +71,7 @@ impl Plane {
                 *code = (MOST * ((value - from) * scale).clamp(0.0, 1.0).sqrt() + 0.5) as u16;
             }
         });
-        let value = |code: u16| from + (to - from) * (f32::from(code) / MOST).powi(2);
+        let value = |code: u16| from + (to - from) * (f32::from(code) / MOST).squared();
         Plane { width, height, codes: Codes::Sixteen(codes), values: (0..=u16::MAX).map(value).collect() }
     }
 

@@ -9,6 +9,7 @@
 //! Cost: one fit and one interpolation per sample. Limits: one width for all of the gloss; widths stay within
 //! [`ALPHA`], base colours within 1. `docs/decisions/edits-of-curves.md` has the errors.
 
+use maths::Maths;
 use std::fmt;
 use std::str::FromStr;
 
@@ -158,16 +159,16 @@ fn stretched(angles: &[f64], gloss: &[f64], from: f64, to: f64) -> Vec<f64> {
         return gloss.to_vec();
     }
     let k = to / from;
-    let cos = |theta: f64| theta.cos().max(1e-6);
-    let visible = |theta: f64, alpha: f64| ggx::shadowing(cos(theta), alpha) / cos(theta).powi(6);
+    let cos = |theta: f64| theta.cosine().max(1e-6);
+    let visible = |theta: f64, alpha: f64| ggx::shadowing(cos(theta), alpha) / cos(theta).whole_power(6);
     let mut samples = gloss.iter().zip(angles).map(|(g, &theta)| g / visible(theta, from));
     let slopes = Curve::sampled(angles, |_| [samples.next().unwrap_or(0.0), 0.0, 0.0]);
     let last = angles.last().copied().unwrap_or(0.0);
     let at = |theta: f64| {
-        let tan = theta.tan() / k;
-        let read = tan.atan();
+        let tan = theta.tangent() / k;
+        let read = tan.arctangent();
         // Beyond the last sample slopes fall with the fourth power, as those of a GGX lobe do.
-        slopes.at(read)[0] * if read > last { (last.tan() / tan).powi(4) } else { 1.0 }
+        slopes.at(read)[0] * if read > last { (last.tangent() / tan).whole_power(4) } else { 1.0 }
     };
     angles.iter().map(|&theta| at(theta) * visible(theta, to) / (k * k)).collect()
 }

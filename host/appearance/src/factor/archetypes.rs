@@ -17,6 +17,7 @@ use super::columns::{accumulate, mix};
 use super::hull::{Combination, Hull, Workspace};
 use super::parts;
 use super::sample::Sample;
+use maths::Maths;
 
 /// Gauss-Newton steps for the weights in each sweep.
 const WEIGHT_STEPS: u32 = 2;
@@ -105,7 +106,7 @@ impl<'a> Fit<'a> {
 
     /// The weight of each column in squared distances in the tangent of the metric.
     fn tangent2(&self) -> Vec<f64> {
-        self.sample.columns.omega.iter().map(|&o| (f64::from(o) / 3.0).powi(2)).collect()
+        self.sample.columns.omega.iter().map(|&o| (f64::from(o) / 3.0).squared()).collect()
     }
 
     /// Improves the weights and sets up the model around them, in one pass.

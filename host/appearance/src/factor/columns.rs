@@ -10,6 +10,7 @@
 //! column count as that much, which changes a distance by at most 1e-4 of its size.
 
 use crate::brdf::Space;
+use maths::Maths;
 
 use super::cbrt::cbrt;
 
@@ -42,7 +43,7 @@ impl Columns {
         let (mut scale, mut omega) = (vec![0.0; padded], vec![0.0; padded]);
         for j in 0..real {
             scale[j] = (1.0 / mean[j]) as f32;
-            omega[j] = (space.weight()[j] * (space.radiance()[j] * mean[j]).cbrt()) as f32;
+            omega[j] = (space.weight()[j] * (space.radiance()[j] * mean[j]).cube_root()) as f32;
         }
         Columns { real, padded, mean, scale, omega }
     }

@@ -9,6 +9,7 @@
 //! Cost: `O(points columns)` for each point that joins, about ten. Limits: stops after [`MOST_JOINED`] joins with a point
 //! in the hull that may not be quite the nearest.
 
+use maths::Maths;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -140,7 +141,7 @@ impl Hull {
             // Half the gradient of the squared distance, in single precision for the pass over all points.
             workspace.slope.clear();
             workspace.slope.extend((0..n).map(|j| (weight[j] * (out[j] - target[j])) as f32));
-            let distance2: f64 = (0..n).map(|j| weight[j] * (out[j] - target[j]).powi(2)).sum();
+            let distance2: f64 = (0..n).map(|j| weight[j] * (out[j] - target[j]).squared()).sum();
             let here: f64 = (0..n).map(|j| weight[j] * (out[j] - target[j]) * out[j]).sum();
             let (joining, least) = self.steepest(&workspace.slope);
             let gap = here - f64::from(least);
@@ -152,7 +153,7 @@ impl Hull {
             from.points.push(joining);
             from.weights.push(0.0);
         }
-        (0..n).map(|j| weight[j] * (out[j] - target[j]).powi(2)).sum()
+        (0..n).map(|j| weight[j] * (out[j] - target[j]).squared()).sum()
     }
 
     /// Computes the best weights for the points of a combination and drops points without weight.
@@ -191,7 +192,7 @@ impl Hull {
 
     fn nearest(&self, target: &[f64], weight: &[f64]) -> usize {
         let distance = |point: &[f32]| -> f64 {
-            point.iter().zip(target).zip(weight).map(|((&p, t), w)| w * (f64::from(p) - t).powi(2)).sum()
+            point.iter().zip(target).zip(weight).map(|((&p, t), w)| w * (f64::from(p) - t).squared()).sum()
         };
         let all = self.points.chunks_exact(self.length).map(distance).enumerate();
         all.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(i, _)| i)
@@ -214,7 +215,7 @@ impl Hull {
 pub(super) fn excursions(sample: &Sample, pca: &Pca, bases: &[f32]) -> Vec<f64> {
     let n = sample.columns.padded;
     let hull = Hull::new(sample.x.clone(), n);
-    let weight: Vec<f64> = sample.columns.omega.iter().map(|&o| (f64::from(o) / 3.0).powi(2)).collect();
+    let weight: Vec<f64> = sample.columns.omega.iter().map(|&o| (f64::from(o) / 3.0).squared()).collect();
     let rows: Vec<&[f32]> = bases.chunks_exact(n).collect();
     rows.par_iter()
         .map(|basis| {

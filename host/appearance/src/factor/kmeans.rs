@@ -9,6 +9,7 @@
 //! materials that resemble each other: the few coordinates tell lightness and gloss but not always an orange beak from a green twig.
 //! Cost: `O(materials k^2)` per iteration, at most [`ITERATIONS`]. Limits: centres stay slightly inside by design.
 
+use maths::Maths;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -208,7 +209,7 @@ fn lift(sample: &Sample, coordinates: &[f64], centres: &[f64], d: usize, k: usiz
         order.sort_by_key(|&(_, i)| i);
         let apart = |i: usize, j: usize| -> f64 {
             let pairs = sample.row(i).iter().zip(sample.row(j)).zip(&sample.columns.omega);
-            f64::from(pairs.map(|((a, b), w)| (w * (a - b)).powi(2)).sum::<f32>()).sqrt()
+            f64::from(pairs.map(|((a, b), w)| (w * (a - b)).squared()).sum::<f32>()).sqrt()
         };
         let near = |i: usize| order.iter().map(|&(_, j)| apart(i, j)).sum::<f64>();
         let most =

@@ -10,6 +10,7 @@
 //! Source: Lawrence et al. 2006 for the problem; the growing penalty is new here.
 
 use crate::solve::{Gram, SimplexBatch};
+use maths::Maths;
 
 use super::columns::{accumulate, dot, mix};
 use super::parts;
@@ -28,7 +29,7 @@ const TYPICAL: usize = 64;
 pub(super) fn refine(sample: &Sample, bases: &mut [f32], lambda: f64, mut done: impl FnMut(Option<f64>)) {
     let padded = sample.columns.padded;
     let k = bases.len() / padded;
-    let tangent2: Vec<f32> = sample.columns.omega.iter().map(|o| (o / 3.0).powi(2)).collect();
+    let tangent2: Vec<f32> = sample.columns.omega.iter().map(|o| (o / 3.0).squared()).collect();
     let scale: f64 = (0..sample.len()).map(|i| sample.weight[i] * length2(sample.row(i), &tangent2)).sum();
     // None are known before the first round.
     let mut weights = vec![0.0; sample.len() * k];

@@ -7,6 +7,7 @@
 //! Cost: at most [`DRAWS`] rows are read and [`VALUES`] values kept. Limits: a material that covers less than a cell of the
 //! document (a hundred-thousandth of a large one) may be missed.
 
+use maths::Maths;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
@@ -163,7 +164,7 @@ struct Merge {
 impl Merge {
     fn new(space: &Space) -> Merge {
         let step = MERGED / (space.columns() as f64).sqrt();
-        let response = space.weight().iter().zip(space.radiance()).map(|(w, c)| w * c.cbrt());
+        let response = space.weight().iter().zip(space.radiance()).map(|(w, c)| w * c.cube_root());
         Merge {
             length: space.columns(),
             steps: response.map(|r| (r / step) as f32).collect(),

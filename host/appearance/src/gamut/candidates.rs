@@ -1,6 +1,7 @@
 //! The stacks that can be used, in the form the solver needs.
 
 use inks::{InkSet, Library, Severity, Stack};
+use maths::Maths;
 
 use crate::brdf::{self, Space, Table};
 use crate::solve::{Hull, LAYER_PRICE, MixtureError};
@@ -105,7 +106,7 @@ impl Candidates {
             printed.iter_mut().zip(albedo).for_each(|(sum, a)| *sum += w * a);
         }
         let both = space.albedo(row).into_iter().zip(printed);
-        both.map(|(a, b)| (a.cbrt() - b.cbrt()).powi(2)).sum::<f64>().sqrt()
+        both.map(|(a, b)| (a.cube_root() - b.cube_root()).squared()).sum::<f64>().sqrt()
     }
 
     /// The reflectance (1/sr) of a mixture.

@@ -1,5 +1,6 @@
 //! The order of the steps: choose cartridges, choose the intent, map the pixels, the bases or both.
 
+use maths::Maths;
 use std::borrow::Cow;
 
 use inks::{InkSet, Stack};
@@ -457,7 +458,7 @@ impl<'a> Pixels<'a> {
 
     /// The facts about the pixels that are known before the mix is: all but the merged pairs.
     fn report(&self, clamped: &Clamped, share: f64) -> PixelReport {
-        let mean_square = |d: &[f32]| d.iter().map(|&d| f64::from(d).powi(2)).sum::<f64>() / d.len() as f64;
+        let mean_square = |d: &[f32]| d.iter().map(|&d| f64::from(d).squared()).sum::<f64>() / d.len() as f64;
         let mut distance = clamped.distance.clone();
         let last = distance.len() - 1;
         let (_, p95, _) = distance.select_nth_unstable_by(last * 95 / 100, f32::total_cmp);

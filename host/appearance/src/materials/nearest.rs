@@ -11,6 +11,7 @@
 //! Cost: some 60 distances, twice that for what is fitted again, or [`Widths`] some 20 sums. A curve that has this form is found to 1e-6.
 //! Limits: one lobe. Of two, it is the one that is seen most; [`Nearest::distance`] says what is missing.
 
+use maths::Maths;
 use std::f64::consts::PI;
 
 use crate::brdf::Space;
@@ -94,7 +95,8 @@ impl Nearest {
 
     /// The nearest by the linearised metric of a target.
     fn by(target: &Target) -> Nearest {
-        let width = |step: f64| ALPHA.start() * (ALPHA.end() / ALPHA.start()).powf(step / (STEPS - 1) as f64);
+        let width =
+            |step: f64| ALPHA.start() * (ALPHA.end() / ALPHA.start()).power(step / (STEPS - 1) as f64);
         let tried = (0..STEPS).map(|step| target.fitted(width(step as f64)));
         let (best, found) = tried
             .enumerate()
@@ -196,9 +198,9 @@ impl<'a> Widths<'a> {
 
 /// The value (1/sr) whose cube root is the mean of those of a row, as the metric weighs them; above 0.
 fn mean(space: &Space, row: &[f64]) -> f64 {
-    let weights = || space.weight().iter().zip(space.radiance()).map(|(w, c)| (w * c.cbrt()).powi(2));
-    let sum: f64 = row.iter().zip(weights()).map(|(f, w)| w * f.max(0.0).cbrt()).sum();
-    (sum / weights().sum::<f64>().max(f64::MIN_POSITIVE)).powi(3) + 1e-12
+    let weights = || space.weight().iter().zip(space.radiance()).map(|(w, c)| (w * c.cube_root()).squared());
+    let sum: f64 = row.iter().zip(weights()).map(|(f, w)| w * f.max(0.0).cube_root()).sum();
+    (sum / weights().sum::<f64>().max(f64::MIN_POSITIVE)).cubed() + 1e-12
 }
 
 fn lobe(space: &Space, alpha: f64) -> Vec<f64> {
@@ -219,8 +221,9 @@ impl<'a> Target<'a> {
     fn above(space: &'a Space, row: &'a [f64], floor: f64) -> Target<'a> {
         // The slope of cbrt(f c) is c^(1/3) f^(-2/3) / 3.
         let columns = row.iter().zip(space.weight().iter().zip(space.radiance()));
-        let weight =
-            columns.map(|(&f, (w, c))| (w * c.cbrt()).powi(2) * f.max(floor).powf(-4.0 / 3.0)).collect();
+        let weight = columns
+            .map(|(&f, (w, c))| (w * c.cube_root()).squared() * f.max(floor).power(-4.0 / 3.0))
+            .collect();
         Target { space, row, weight }
     }
 

@@ -8,6 +8,7 @@
 //! of the memory.
 //! Cost: a logarithm and some look-ups per pixel; 8 operations per sample, no root, no trigonometry.
 
+use maths::Maths;
 use std::fmt;
 use std::sync::Arc;
 
@@ -34,7 +35,7 @@ impl Lobes {
         let table = (0..LEVELS)
             .flat_map(|level| {
                 let s = level as f64 / (LEVELS - 1) as f64;
-                let alpha = f64::from(LEAST_ALPHA).powf(1.0 - s);
+                let alpha = f64::from(LEAST_ALPHA).power(1.0 - s);
                 space.angles().iter().map(move |&t| inks::ggx::lobe(t, alpha) as f32)
             })
             .collect();
@@ -43,13 +44,13 @@ impl Lobes {
 
     /// The position of an alpha in the table, 0 to LEVELS - 1.
     fn position(alpha: f32) -> f32 {
-        let s = 1.0 - alpha.ln() / LEAST_ALPHA.ln();
+        let s = 1.0 - alpha.logarithm() / LEAST_ALPHA.logarithm();
         (s * (LEVELS - 1) as f32).clamp(0.0, (LEVELS - 1) as f32)
     }
 
     #[cfg(test)]
     fn alpha(position: f32) -> f32 {
-        LEAST_ALPHA.powf(1.0 - position / (LEVELS - 1) as f32)
+        LEAST_ALPHA.power(1.0 - position / (LEVELS - 1) as f32)
     }
 
     /// The two table rows around a position, and the weight of the second.

@@ -3,6 +3,7 @@
 //! Shapes are signed distances in pixels (negative inside), so that one number gives edges, rims and shadows. Each segment
 //! of a stroke changes only the pixels near it.
 
+use maths::Maths;
 use rayon::prelude::*;
 
 use super::painting::{Finish, Painting};
@@ -101,7 +102,7 @@ pub fn clouds(x: f32, y: f32, octaves: u32, seed: u32) -> f32 {
         weight *= 0.5;
         scale *= 2.03;
     }
-    sum / (1.0 - 0.5f32.powi(octaves as i32))
+    sum / (1.0 - 0.5f32.whole_power(octaves as i32))
 }
 
 /// Distances to the nearest and the second nearest of random points, one per unit cell.

@@ -1,5 +1,6 @@
 //! A greeting card: a word and a border in gold, stars in silver, glossy holly on matte paper.
 
+use maths::Maths;
 use std::f32::consts::TAU;
 
 use super::canvas::{Coat, DistanceField, Point, bezier, clouds, hash, inside, mix, noise, paint, smooth};
@@ -15,8 +16,8 @@ fn pen(shape: &mut DistanceField, strokes: &[[Point; 4]], at: Point, scale: f32,
         let points: Vec<Point> = (0..=36).map(|k| bezier(curve, k as f32 / 36.0)).collect();
         let radius = |u: f32| {
             let (a, b) = (bezier(curve, (u - 0.02).max(0.0)), bezier(curve, (u + 0.02).min(1.0)));
-            let slant = (b[1] - a[1]).atan2(b[0] - a[0]) + 40f32.to_radians();
-            mix(thin, wide, slant.sin().abs())
+            let slant = (b[1] - a[1]).arctangent2(b[0] - a[0]) + 40f32.to_radians();
+            mix(thin, wide, slant.sine().abs())
         };
         shape.line(&points, radius);
     }
@@ -51,7 +52,7 @@ const FLOURISH: [[Point; 4]; 5] = [
 
 /// A leaf of holly: its outline between seven spines, and its middle vein.
 fn holly(leaves: &mut DistanceField, veins: &mut DistanceField, base: Point, degrees: f32, length: f32) {
-    let (s, c) = degrees.to_radians().sin_cos();
+    let (s, c) = degrees.to_radians().sine_cosine();
     let place = |x: f32, y: f32| [base[0] + length * (c * x - s * y), base[1] + length * (s * x + c * y)];
     const SPINES: [Point; 5] = [[0.0, 0.02], [0.18, 0.21], [0.45, 0.30], [0.74, 0.24], [1.0, 0.0]];
     let mut outline = Vec::new();
@@ -83,7 +84,7 @@ fn star(shape: &mut DistanceField, centre: Point, radius: f32, turn: f32) {
     for arm in 0..6 {
         let angle = turn + TAU * arm as f32 / 6.0;
         let toward = |angle: f32, from: Point, length: f32| {
-            [from[0] + length * angle.cos(), from[1] + length * angle.sin()]
+            [from[0] + length * angle.cosine(), from[1] + length * angle.sine()]
         };
         shape.stroke(centre, toward(angle, centre, radius), 0.07 * radius + 0.6, 0.6);
         for at in [0.42, 0.68] {
@@ -171,7 +172,7 @@ const BERRIES: [(Point, f32); 5] = [
 /// The signed distance to the nearest berry, and its radius in eighths of a pixel.
 fn berry(p: Point) -> (f32, u32) {
     BERRIES.iter().fold((f32::MAX, 0), |best, (c, r)| {
-        let d = ((p[0] - c[0]).powi(2) + (p[1] - c[1]).powi(2)).sqrt() - r;
+        let d = ((p[0] - c[0]).squared() + (p[1] - c[1]).squared()).sqrt() - r;
         if d < best.0 { (d, (*r * 8.0) as u32) } else { best }
     })
 }
@@ -185,7 +186,7 @@ pub fn draw() -> Painting {
     let red = Coat::new(0xC3141E, 0.14, 0.0);
     paint(WIDTH, HEIGHT, (1050, 1480), |i, p| {
         let fibre = noise(p[0] / 2.0, p[1] / 5.0, 1) + noise(p[0] / 9.0, p[1] / 2.0, 2) - 1.0;
-        let glow = smooth(760.0, 60.0, ((p[0] - 512.0).powi(2) + (0.8 * (p[1] - 640.0)).powi(2)).sqrt());
+        let glow = smooth(760.0, 60.0, ((p[0] - 512.0).squared() + (0.8 * (p[1] - 640.0)).squared()).sqrt());
         let mut coat = paper.shaded((0.72 + 0.62 * glow) * (1.0 + 0.07 * fibre));
         coat = coat.under(silver_coat, inside(silver.at(i)));
         let worn = clouds(p[0] / 60.0, p[1] / 60.0, 3, 30);

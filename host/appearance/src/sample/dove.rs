@@ -2,6 +2,7 @@
 
 use super::canvas::{Coat, DistanceField, Point, bezier, clouds, inside, mix, noise, paint, smooth};
 use super::painting::Painting;
+use maths::Maths;
 
 const WIDTH: usize = 1280;
 const HEIGHT: usize = 960;
@@ -77,16 +78,16 @@ impl Wing {
             let u = k as f32 / (self.feathers - 1) as f32;
             let from = bezier(arm, u);
             let angle = mix(self.fan.0, self.fan.1, u).to_radians();
-            let length = mix(self.lengths.0, self.lengths.1, smooth(0.0, 1.0, u.powf(0.8)));
+            let length = mix(self.lengths.0, self.lengths.1, smooth(0.0, 1.0, u.power(0.8)));
             // Feathers curve back a little towards their tips.
             let points: Vec<Point> = (0..=12)
                 .map(|s| {
                     let s = s as f32 / 12.0;
                     let bent = angle - 0.28 * s * s;
-                    [from[0] + length * s * bent.cos(), from[1] + length * s * bent.sin()]
+                    [from[0] + length * s * bent.cosine(), from[1] + length * s * bent.sine()]
                 })
                 .collect();
-            shape.line(&points, |s| 21.0 * (1.0 - s.powi(4)).max(0.02).sqrt() + 2.0);
+            shape.line(&points, |s| 21.0 * (1.0 - s.whole_power(4)).max(0.02).sqrt() + 2.0);
             lines.line(&points, |s| mix(2.0, 0.5, s));
         }
         let arm: Vec<Point> = (0..=10).map(|k| bezier(arm, k as f32 / 10.0)).collect();
@@ -103,20 +104,20 @@ fn twig(stem: &mut DistanceField, leaves: &mut DistanceField, veins: &mut Distan
     for k in 0..9 {
         let u = 0.1 + 0.1 * k as f32;
         let (at, next) = (bezier(curve, u), bezier(curve, u + 0.02));
-        let heading = (next[1] - at[1]).atan2(next[0] - at[0]);
+        let heading = (next[1] - at[1]).arctangent2(next[0] - at[0]);
         let side = if k % 2 == 0 { 1.0 } else { -1.0 };
         let angle = heading + side * if k == 8 { 0.0 } else { 0.85 };
         let length = mix(104.0, 74.0, u);
         let place = |s: f32, across: f32| {
             [
-                at[0] + length * s * angle.cos() - across * angle.sin(),
-                at[1] + length * s * angle.sin() + across * angle.cos(),
+                at[0] + length * s * angle.cosine() - across * angle.sine(),
+                at[1] + length * s * angle.sine() + across * angle.cosine(),
             ]
         };
         let outline: Vec<Point> = (0..24)
             .map(|j| {
                 let (s, side) = if j < 12 { (j as f32 / 12.0, 1.0) } else { (2.0 - j as f32 / 12.0, -1.0) };
-                place(s, side * 15.0 * (4.0 * s * (1.0 - s)).powf(0.8))
+                place(s, side * 15.0 * (4.0 * s * (1.0 - s)).power(0.8))
             })
             .collect();
         leaves.fill(&outline);
@@ -154,7 +155,7 @@ pub fn draw() -> Painting {
     let (leaf, pale) = (Coat::new(0x5E7F3A, 0.3, 0.0), Coat::new(0xB9C78E, 0.4, 0.0));
     paint(WIDTH, HEIGHT, (1600, 1200), |i, p| {
         let fibre = noise(p[0] / 2.5, p[1] / 6.0, 1) + noise(p[0] / 11.0, p[1] / 2.5, 2) - 1.0;
-        let glow = smooth(900.0, 120.0, ((p[0] - 640.0).powi(2) + (p[1] - 480.0).powi(2)).sqrt());
+        let glow = smooth(900.0, 120.0, ((p[0] - 640.0).squared() + (p[1] - 480.0).squared()).sqrt());
         let nearest = body.at(i).min(near.at(i)).min(far.at(i));
         let shadow = 0.4 * smooth(34.0, -10.0, nearest);
         let mut coat = blue.shaded((0.68 + 0.55 * glow) * (1.0 + 0.05 * fibre) * (1.0 - shadow));
@@ -183,7 +184,7 @@ pub fn draw() -> Painting {
         let wing = feather(shafts.at(i), mix(rim(near.at(i)), 1.0, covert)).under(plumage, covert);
         coat = coat.under(wing, inside(near.at(i)));
 
-        let eye = ((p[0] - 868.0).powi(2) + (p[1] - 388.0 - DROP).powi(2)).sqrt() - 6.5;
+        let eye = ((p[0] - 868.0).squared() + (p[1] - 388.0 - DROP).squared()).sqrt() - 6.5;
         coat = coat.under(Coat::new(0x14100E, 0.1, 0.0), inside(eye));
         coat = coat.under(Coat::new(0xD98B3A, 0.3, 0.0), inside(beak.at(i)));
         coat = coat.under(Coat::new(0x6A4A26, 0.5, 0.0), inside(stem.at(i)));

@@ -1,5 +1,6 @@
 //! A rusted steel flange: a turned ring with bolt holes, partly bare metal and partly rust.
 
+use maths::Maths;
 use std::f32::consts::TAU;
 
 use super::canvas::{Coat, Point, cells, clouds, hash, inside, mix, noise, paint, smooth};
@@ -28,8 +29,8 @@ fn ring(p: Point) -> Ring {
     let radius = (x * x + y * y).sqrt();
     let turn = TAU / HOLES as f32;
     // The bolt nearest in angle.
-    let angle = ((y.atan2(x) / turn - 0.5).round() + 0.5) * turn;
-    let (hx, hy) = (x - BOLTS * angle.cos(), y - BOLTS * angle.sin());
+    let angle = ((y.arctangent2(x) / turn - 0.5).round() + 0.5) * turn;
+    let (hx, hy) = (x - BOLTS * angle.cosine(), y - BOLTS * angle.sine());
     let hole = (hx * hx + hy * hy).sqrt() - HOLE;
     let edge = (radius - OUTER).max(BORE - radius).max(-hole);
     Ring { radius, edge, hole }
@@ -58,7 +59,7 @@ pub fn draw() -> Painting {
         // Scratches, each a straight line through a cell.
         let (cx, cy) = ((p[0] / 150.0).floor(), (p[1] / 150.0).floor());
         let tilt = TAU * hash(cx as i32, cy as i32, 60);
-        let across = (p[0] - 150.0 * cx - 75.0) * tilt.sin() - (p[1] - 150.0 * cy - 75.0) * tilt.cos();
+        let across = (p[0] - 150.0 * cx - 75.0) * tilt.sine() - (p[1] - 150.0 * cy - 75.0) * tilt.cosine();
         let scratch = smooth(1.4, 0.2, (across + 30.0 * (wear - 0.5)).abs());
         metal.roughness += 0.2 * scratch;
 

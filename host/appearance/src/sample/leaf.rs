@@ -8,6 +8,7 @@ use super::canvas::{
     mix3, paint, smooth,
 };
 use super::painting::Painting;
+use maths::Maths;
 
 const WIDTH: usize = 1024;
 const HEIGHT: usize = 1448;
@@ -54,7 +55,7 @@ fn unit(v: Point) -> Point {
 }
 
 fn turned(v: Point, degrees: f32) -> Point {
-    let (s, c) = degrees.to_radians().sin_cos();
+    let (s, c) = degrees.to_radians().sine_cosine();
     [c * v[0] - s * v[1], s * v[0] + c * v[1]]
 }
 
@@ -165,13 +166,13 @@ pub fn draw() -> Painting {
 
     let mut silver = DistanceField::new(WIDTH, HEIGHT, 16.0);
     let stalk: Vec<Point> = (0..=40).map(|k| bezier(MIDRIB, k as f32 / 40.0)).collect();
-    silver.line(&stalk, |u| mix(9.0, 1.6, u.powf(0.7)));
+    silver.line(&stalk, |u| mix(9.0, 1.6, u.power(0.7)));
     for (points, _) in &veins {
         silver.line(points, |u| mix(4.6, 1.3, u));
     }
     let mut fine = DistanceField::new(WIDTH, HEIGHT, 5.0);
     for (i, (points, radius)) in veins.iter().enumerate() {
-        let length: f32 = points.windows(2).map(|p| (p[1][0] - p[0][0]).hypot(p[1][1] - p[0][1])).sum();
+        let length: f32 = points.windows(2).map(|p| (p[1][0] - p[0][0]).hypotenuse(p[1][1] - p[0][1])).sum();
         let count = (length / 46.0) as usize + 1;
         branches(&mut fine, points, 1.5 * radius, count, 1.15, 1, 100 + i as u32);
     }

@@ -2,6 +2,7 @@
 
 use super::hull::{Hull, Target};
 use super::root::inverse_cbrt;
+use maths::Maths;
 
 impl Target {
     /// Cube root of the radiance, column by column.
@@ -13,7 +14,7 @@ impl Target {
     pub(crate) fn shift(&mut self, by: impl Iterator<Item = f64>) {
         for ((root, radiance), by) in self.root.iter_mut().zip(&mut self.radiance).zip(by) {
             *root += by;
-            *radiance = root.max(0.0).powi(3);
+            *radiance = root.max(0.0).cubed();
         }
     }
 }

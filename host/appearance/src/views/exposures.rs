@@ -5,6 +5,8 @@
 //! burn out, whose shadows are black. Between the two the print mixes them, so its exposure changes with the tilt.
 //! Limits: two exposures, clipped; no local tone mapping.
 
+use maths::Maths;
+
 /// The luminance of the logarithmic mean.
 const KEY: f64 = 0.18;
 
@@ -29,14 +31,14 @@ impl Exposures {
         let mut lit: Vec<f64> = luminance.iter().copied().filter(|&y| y > 0.0).collect();
         lit.sort_unstable_by(f64::total_cmp);
         let last = lit.len().checked_sub(1)?;
-        let mean = (lit.iter().map(|y| y.ln()).sum::<f64>() / lit.len() as f64).exp();
+        let mean = (lit.iter().map(|y| y.logarithm()).sum::<f64>() / lit.len() as f64).exponential();
         let brightest = lit[last - (burnt * last as f64) as usize];
         Some(Exposures { long: KEY / mean, short: 1.0 / brightest })
     }
 
     /// How far the exposures lie apart, in stops.
     pub(super) fn stops(self) -> f64 {
-        (self.long / self.short).log2()
+        (self.long / self.short).logarithm2()
     }
 }
 

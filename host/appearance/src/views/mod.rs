@@ -14,6 +14,8 @@
 //! Source: Hersch et al. 2003 print metal inks beside standard ones in one picture; here the choice is left to the hull of the
 //! stacks, and the second picture is a target of its own.
 
+use maths::Maths;
+
 mod exposures;
 mod open;
 mod reach;
@@ -45,6 +47,6 @@ pub struct Views {
 /// The difference in lightness of two luminances under a white, as the cube root of 1976's L*: 1 from black to white.
 #[must_use]
 pub fn contrast(dark: f64, bright: f64, white: f64) -> f64 {
-    let root = |luminance: f64| (luminance.max(0.0) / white).cbrt();
+    let root = |luminance: f64| (luminance.max(0.0) / white).cube_root();
     root(bright) - root(dark)
 }

@@ -11,6 +11,7 @@
 
 use crate::brdf::Space;
 use crate::gamut::Printable;
+use maths::Maths;
 
 use super::{REFLECTION, STRAIGHT, contrast};
 
@@ -102,8 +103,8 @@ pub fn reach(printable: &Printable, space: &Space) -> Option<Reach> {
         return None;
     }
     let step = |i: usize| {
-        let [low, high] = [first, last].map(|x: f64| x.max(0.0).cbrt());
-        (low + (high - low) * i as f64 / (STEPS - 1) as f64).powi(3).clamp(first, last)
+        let [low, high] = [first, last].map(|x: f64| x.max(0.0).cube_root());
+        (low + (high - low) * i as f64 / (STEPS - 1) as f64).cubed().clamp(first, last)
     };
     let grid: Vec<[f64; 3]> =
         (0..STEPS).map(|i| [step(i), height(&below, step(i)), height(&above, step(i))]).collect();

@@ -8,6 +8,7 @@
 //! Cost: a walk over the paths; the text of the drawing if there are thin parts. Limits: a shape whose thin parts are a
 //! small share of it, patterns, clips and masks, and drawings within drawings stay as they are.
 
+use maths::Maths;
 use resvg::tiny_skia::{Path, PathSegment, Point, Transform};
 use resvg::usvg::{self, roxmltree};
 
@@ -106,8 +107,8 @@ fn need(path: &usvg::Path, place: Transform) -> Option<Need> {
 
 /// The most and the least dots that one unit becomes: the singular values of the transform.
 fn stretch(t: Transform) -> (f32, f32) {
-    let sum = (t.sx + t.sy).hypot(t.ky - t.kx);
-    let difference = (t.sx - t.sy).hypot(t.ky + t.kx);
+    let sum = (t.sx + t.sy).hypotenuse(t.ky - t.kx);
+    let difference = (t.sx - t.sy).hypotenuse(t.ky + t.kx);
     ((sum + difference) / 2.0, (sum - difference).abs() / 2.0)
 }
 
@@ -183,7 +184,7 @@ impl Ring {
         let of = |p: Point| (f64::from(p.x - self.first.x), f64::from(p.y - self.first.y));
         let ((ax, ay), (bx, by)) = (of(from), of(to));
         self.area += (ax * by - bx * ay) / 2.0;
-        self.outline += (bx - ax).hypot(by - ay);
+        self.outline += (bx - ax).hypotenuse(by - ay);
         self.around = joined(self.around, [to.x, to.y, to.x, to.y]);
     }
 }

@@ -8,6 +8,7 @@
 //! no `color-mix()`, no percentages in transforms; `device-cmyk()` is converted as CSS does without a profile.
 //! Source: CSS Color 4 and 5, CSS Transforms 1 and 2, CSS Variables 1.
 
+use maths::Maths;
 use palette::encoding::DisplayP3;
 use palette::rgb::Rgb;
 use palette::{FromColor, LinSrgb, Oklab, Oklch, Srgb, Xyz};
@@ -249,7 +250,7 @@ fn transform(value: &str, lower: &str) -> Option<Value> {
             ("skewx" | "skew", [x]) => format!("skewX({})", angle(x)?),
             ("skewy", [y]) => format!("skewY({})", angle(y)?),
             ("skew", [x, y]) => {
-                let slope = |text: &str| angle(text).map(|degrees| degrees.to_radians().tan());
+                let slope = |text: &str| angle(text).map(|degrees| degrees.to_radians().tangent());
                 format!("matrix(1 {} {} 1 0 0)", slope(y)?, slope(x)?)
             }
             ("matrix", [_, _, _, _, _, _]) => {

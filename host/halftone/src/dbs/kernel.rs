@@ -7,6 +7,7 @@
 
 use super::{REACH, lines};
 use crate::clustered::mask::BLOCK;
+use maths::Maths;
 
 /// From how far the eye looks, `a` in dots: 0.3 m and 0.5 m.
 const SCALES: [f32; 2] = [7.62, 12.7];
@@ -52,7 +53,7 @@ impl Kernel {
     /// The value at a distance in half dots.
     pub(super) fn value(x: isize, y: isize) -> f32 {
         let eye = |scale: f32| {
-            let square = |half_dots: isize| (half_dots as f32 / 2.0 / scale).powi(2);
+            let square = |half_dots: isize| (half_dots as f32 / 2.0 / scale).squared();
             let sum = 1.0 + square(x) + square(y);
             // Roots are rounded once on every machine; powers of 3/2 are not.
             1.0 / (sum * sum.sqrt())

@@ -7,6 +7,8 @@
 //! Energies are integers, so the table is the same on any machine.
 //! Cost: some 500 additions a dot.
 
+use maths::Maths;
+
 /// Deviation of the wide Gaussian in dots, and of the narrow one; the narrow one's height.
 const WIDE: f64 = 2.2;
 const NARROW: f64 = 0.8;
@@ -75,7 +77,7 @@ impl Field {
         let across = 2 * reach + 1;
         let kernel = (0..across * across).map(|at| {
             let (x, y) = ((at % across) as f64 - reach as f64, (at / across) as f64 - reach as f64);
-            let gauss = |deviation: f64| (-(x * x + y * y) / (2.0 * deviation * deviation)).exp();
+            let gauss = |deviation: f64| (-(x * x + y * y) / (2.0 * deviation * deviation)).exponential();
             (65536.0 * (gauss(wide) - DEPTH * gauss(narrow))).round() as i32
         });
         let mut field = Field {

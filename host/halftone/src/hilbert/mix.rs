@@ -10,6 +10,7 @@
 //! Cost: channels x stacks multiplications a stretch, eight at a time; stacks and channels without any weight are
 //! left out. Memory: a table of a few bytes for each half dot of the two sides.
 
+use maths::Maths;
 use protocol::walk::{EDGE, MOST, Tile, Walk};
 
 use super::rule::{LANES, Lanes, Source, UNIT, blocks};
@@ -201,7 +202,7 @@ impl<'a> Lattice<'a> {
                 }
             }
         }
-        let unit = (f64::from(Axis::FULL) * f64::from(ONE)).powi(2);
+        let unit = (f64::from(Axis::FULL) * f64::from(ONE)).squared();
         let share = |&q: &u8| {
             let shares = self.mix.matrix.iter().map(|shares| f64::from(shares[usize::from(q)]));
             sums.iter().zip(shares).map(|(&sum, share)| sum as f64 * share).sum::<f64>() / unit

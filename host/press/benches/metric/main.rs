@@ -2,6 +2,8 @@
 //!
 //! `FOILPRESS_DATA=... cargo bench -p foilpress-press --bench metric -- weights`, or `bounds`, `widths`, `balls`, `prints`.
 
+#![allow(clippy::disallowed_methods, reason = "it decides no dot of a job")]
+
 mod balls;
 mod light;
 mod prints;

@@ -8,6 +8,8 @@
 //! Cost: one pass over the dots, 24 multiply-adds a cell. Limits: luminance alone; two pictures that resemble each other
 //! (correlation beyond [`ALIKE`]) cannot be told apart, and have no figures.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 use std::fmt;
 
 use appearance::factor::Factored;

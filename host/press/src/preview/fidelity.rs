@@ -9,6 +9,9 @@
 //! Cost: one pass over dots and document pixels; memory for a few lines of cells.
 //! Limits: one achromatic contrast model for all columns; detail finer than a cell is ignored.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
+use maths::Maths;
 use rayon::prelude::*;
 
 use appearance::brdf::Space;
@@ -51,7 +54,7 @@ pub const EYE: f64 = 0.5;
 
 /// Side in millimetres of the square window that the eye averages over at `metres`. See the module text.
 pub fn spot_mm(metres: f64) -> f64 {
-    let cycles = 0.525 * 11f64.ln() + 3.91;
+    let cycles = 0.525 * 11f64.logarithm() + 3.91;
     let degrees = (2.0 / std::f64::consts::PI).sqrt() / cycles;
     1000.0 * metres * degrees.to_radians()
 }
@@ -106,7 +109,7 @@ pub fn fidelity(
             },
         );
         for (a, b) in a.chunks_exact(columns).zip(b.chunks_exact(columns)) {
-            light += space.light_distance(a, b).powi(2);
+            light += space.light_distance(a, b).squared();
         }
         observer.advance(count as u64);
         light
@@ -116,7 +119,7 @@ pub fn fidelity(
     let n = map.len() as f64;
     let light_rmse = (light.iter().sum::<f64>() / n).sqrt();
     let mean = map.iter().map(|&d| f64::from(d)).sum::<f64>() / n;
-    let rmse = (map.iter().map(|&d| f64::from(d).powi(2)).sum::<f64>() / n).sqrt();
+    let rmse = (map.iter().map(|&d| f64::from(d).squared()).sum::<f64>() / n).sqrt();
     let mut sorted = map.clone();
     sorted.sort_unstable_by(f32::total_cmp);
     let at = |share: f64| f64::from(sorted[((sorted.len() - 1) as f64 * share).round() as usize]);

@@ -2,6 +2,7 @@
 
 mod report;
 
+use maths::Maths;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
@@ -241,7 +242,7 @@ impl Halftone {
         let chosen = halftone::Settings::from_library(&mix.stacks, library);
         let space = document.materials().space();
         let looks = reflectances(dots.stacks(), library, space);
-        let lightness = |row: &[f64]| luminance(space.curve(row).at(ASIDE)).cbrt();
+        let lightness = |row: &[f64]| luminance(space.curve(row).at(ASIDE)).cube_root();
         let values: Vec<f64> = looks.rows().map(lightness).collect();
         let (tones, (look, spectrum)) = rayon::join(
             || metrics::tones(mix, dots, observer),

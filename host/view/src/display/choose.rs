@@ -7,6 +7,7 @@
 //! need more cartridges than the printer holds, or does not hold in cells of this size, is left out.
 //! Cost: candidates x (1 to 3 rounds) x stacks x sample solutions of [`Solver`]. Limits: not always the best set.
 
+use maths::Maths;
 use std::collections::BTreeSet;
 
 use appearance::brdf::{Space, Table, reflectances};
@@ -51,11 +52,11 @@ impl<'a> Target<'a> {
         }
         let seen = |row: &[f32]| -> Vec<f64> {
             let each = row.iter().zip(space.radiance()).zip(space.weight());
-            each.map(|((&f, c), w)| w * (f64::from(f).max(0.0) * c).cbrt()).collect()
+            each.map(|((&f, c), w)| w * (f64::from(f).max(0.0) * c).cube_root()).collect()
         };
         let points: Vec<Vec<f64>> = searched.iter().map(|row| seen(row)).collect();
         let apart = |a: usize, b: usize| -> f64 {
-            points[a].iter().zip(&points[b]).map(|(a, b)| (a - b).powi(2)).sum()
+            points[a].iter().zip(&points[b]).map(|(a, b)| (a - b).squared()).sum()
         };
         let mut drawn: Vec<usize> = (0..SAMPLE / 2).collect();
         let nearest = |k: usize| drawn.iter().map(|&d| apart(k, d)).fold(f64::INFINITY, f64::min);
@@ -106,7 +107,8 @@ pub fn choose(
             let mut rows = Table::new(target.space.columns());
             set.iter().for_each(|&q| rows.push(table.row(q)));
             let solver = Solver::of_rows(target.space, &rows, &vec![1.0; set.len()], screen.leak());
-            target.rows.iter().map(|row| solver.solve(row).1.powi(2)).sum::<f64>() / target.rows.len() as f64
+            target.rows.iter().map(|row| solver.solve(row).1.squared()).sum::<f64>()
+                / target.rows.len() as f64
         };
         Some(targets.iter().zip(&tables).map(sum).sum())
     };

@@ -9,6 +9,7 @@
 
 use appearance::brdf::{Space, reflectances};
 use inks::{Library, Stack};
+use maths::Maths;
 use sheet::{DOTS_PER_MM, DotMap};
 
 use super::{DisplayError, MOST_STACKS, Screen};
@@ -209,7 +210,7 @@ impl Grid {
 
     /// How bright the display is beside a print: the brightness that every stack reaches alone.
     pub fn brightness(&self) -> f64 {
-        self.shares().into_iter().fold(1.0, f64::min) * self.screen.open.powi(2)
+        self.shares().into_iter().fold(1.0, f64::min) * self.screen.open.squared()
     }
 
     /// The dots to print.

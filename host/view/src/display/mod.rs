@@ -26,6 +26,8 @@
 //! dots, so they are up to half a dot (0.02 mm) beside the screen's.
 //! Source: section 6 and figure 12 of the 2009 paper; the model is ours.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod choose;
 mod frame;
 mod grid;
@@ -35,6 +37,7 @@ mod seen;
 mod solve;
 
 use inks::Stack;
+use maths::Maths;
 use sheet::SheetError;
 
 use crate::error::ViewError;
@@ -78,19 +81,19 @@ impl Screen {
 
     /// The share of light that passes a pixel of this value once.
     pub fn passes(&self, value: u8) -> f64 {
-        self.closed + (self.open - self.closed) * (f64::from(value) / 255.0).powf(GAMMA)
+        self.closed + (self.open - self.closed) * (f64::from(value) / 255.0).power(GAMMA)
     }
 
     /// The value that lets `twice` of `open^2` pass on the way in and out, 0..=1.
     pub fn value(&self, twice: f64) -> u8 {
         let once = self.open * twice.max(0.0).sqrt();
         let part = ((once - self.closed) / (self.open - self.closed)).clamp(0.0, 1.0);
-        (255.0 * part.powf(1.0 / GAMMA)).round() as u8
+        (255.0 * part.power(1.0 / GAMMA)).round() as u8
     }
 
     /// What a closed cell still shows, as a share of what an open one shows.
     pub fn leak(&self) -> f64 {
-        (self.closed / self.open).powi(2)
+        (self.closed / self.open).squared()
     }
 
     fn check(&self) -> Result<(), DisplayError> {

@@ -12,6 +12,7 @@
 
 use appearance::brdf::{Space, Table, reflectances};
 use inks::{Library, Stack};
+use maths::Maths;
 
 /// Relative fall of the objective below which the search ends, and the most steps.
 const DROP: f64 = 1e-10;
@@ -62,7 +63,7 @@ impl Solver {
     pub fn solve(&self, target: &[f32]) -> (Vec<f64>, f64) {
         let target: Vec<f64> =
             target.iter().zip(&self.radiance).map(|(f, c)| (f64::from(*f) * c).max(0.0)).collect();
-        let roots: Vec<f64> = target.iter().map(|t| t.cbrt()).collect();
+        let roots: Vec<f64> = target.iter().map(|t| t.cube_root()).collect();
         let count = self.rows.len();
         let bounds = vec![(self.leak, 1.0); count];
         let mut open = vec![0.5 * (self.leak + 1.0); count];
@@ -74,8 +75,9 @@ impl Solver {
         within(&hessian, &slope, &bounds, &mut open);
         let mut value = self.value(&open, &roots);
         for _ in 0..MOST_STEPS {
-            let (hessian, slope) = self
-                .model(&open, |j, mixed| (self.slope(j, mixed), self.weight[j] * (mixed.cbrt() - roots[j])));
+            let (hessian, slope) = self.model(&open, |j, mixed| {
+                (self.slope(j, mixed), self.weight[j] * (mixed.cube_root() - roots[j]))
+            });
             let mut full = open.clone();
             within(&hessian, &slope, &bounds, &mut full);
             let step: Vec<f64> = full.iter().zip(&open).map(|(to, from)| to - from).collect();
@@ -105,13 +107,13 @@ impl Solver {
 
     /// How fast the weighted cube root of column j grows at a radiance.
     fn slope(&self, j: usize, radiance: f64) -> f64 {
-        self.weight[j] / (3.0 * radiance.max(self.floor).cbrt().powi(2))
+        self.weight[j] / (3.0 * radiance.max(self.floor).cube_root().squared())
     }
 
     /// The objective: squared distance.
     pub(super) fn value(&self, open: &[f64], roots: &[f64]) -> f64 {
-        let miss = |j: usize| self.weight[j] * (self.mixed(open, j).cbrt() - roots[j]);
-        (0..roots.len()).map(|j| miss(j).powi(2)).sum()
+        let miss = |j: usize| self.weight[j] * (self.mixed(open, j).cube_root() - roots[j]);
+        (0..roots.len()).map(|j| miss(j).squared()).sum()
     }
 
     /// The quadratic model: half its second and first derivatives. `at` gives the slope and the weighted miss of a column.

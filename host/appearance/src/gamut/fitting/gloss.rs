@@ -7,6 +7,7 @@
 //! survive. Cost: one line search per basis. Limits: a factor cannot narrow a lobe, only lower it.
 
 use crate::brdf::{Space, Table};
+use maths::Maths;
 
 /// Two rows differ if their distance exceeds this.
 pub(crate) const DIFFERENT: f64 = 0.03;
@@ -58,10 +59,10 @@ pub(crate) fn factor(space: &Space, targets: &Table, printed: &[Vec<f64>]) -> f6
     for (i, printed) in printed.iter().enumerate() {
         let mut one = Table::new(targets.columns());
         one.push(targets.row(i));
-        let miss = |log: f64| space.distance(scaled(&one, log.exp()).row(0), printed);
+        let miss = |log: f64| space.distance(scaled(&one, log.exponential()).row(0), printed);
         // Golden-section search on the logarithm; the distance has a single minimum along the factor.
         let golden = 0.618_033_988_749_895;
-        let (mut low, mut high) = (0.02f64.ln(), 0.0);
+        let (mut low, mut high) = (0.02f64.logarithm(), 0.0);
         let (mut x, mut y) = (high - golden * (high - low), low + golden * (high - low));
         let (mut at_x, mut at_y) = (miss(x), miss(y));
         for _ in 0..40 {
@@ -79,7 +80,7 @@ pub(crate) fn factor(space: &Space, targets: &Table, printed: &[Vec<f64>]) -> f6
         let found = 0.5 * (low + high);
         let full = miss(0.0);
         if miss(found) < full - 1e-9 {
-            least = least.min(found.exp());
+            least = least.min(found.exponential());
         }
     }
     least

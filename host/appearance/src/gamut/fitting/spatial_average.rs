@@ -11,6 +11,7 @@
 //! window of a large document with coarse pixels is wider than the eye's. Limits: two sweeps, so not the optimum; each pixel by
 //! itself comes out farther from the document, by a few percent; documents whose pixels are as large as the spot stay as they are.
 
+use maths::Maths;
 use observe::Observer;
 use rayon::prelude::*;
 
@@ -186,7 +187,7 @@ impl Cells {
                 self.read(shift, pixel, &mut solver.shift);
                 if pass.first {
                     let columns = solver.shift.iter().zip(candidates.priced.metric());
-                    moves[i] = columns.map(|(s, w)| (s * w).powi(2)).sum::<f64>() > FELT * FELT;
+                    moves[i] = columns.map(|(s, w)| (s * w).squared()).sum::<f64>() > FELT * FELT;
                     if !moves[i] {
                         continue;
                     }

@@ -9,6 +9,7 @@
 //! maker says is in neither; curves without standard deviations, such as modelled ones, count as exact.
 
 use inks::Library;
+use maths::Maths;
 use serde::Serialize;
 
 use super::mix::InkMix;
@@ -78,8 +79,8 @@ pub fn distance_uncertainty(
         for ((wanted, printed), sigma) in differences(space, wanted, &printed, &sigma) {
             let (apart, sigma) = (wanted - printed, BAND * sigma);
             all += apart * apart;
-            own += (sigma / BAND).powi(2);
-            within += apart.abs().min(sigma).powi(2);
+            own += (sigma / BAND).squared();
+            within += apart.abs().min(sigma).squared();
         }
     }
     let count = sampled.len() as f64;
@@ -97,7 +98,7 @@ fn mixture(shares: &[f64], curves: &Table, deviations: &[Option<Vec<f64>>]) -> (
     for ((&share, curve), deviation) in shares.iter().zip(curves.rows()).zip(deviations) {
         printed.iter_mut().zip(curve).for_each(|(sum, f)| *sum += share * f);
         for (sum, sigma) in variance.iter_mut().zip(deviation.iter().flatten()) {
-            *sum += (share * sigma).powi(2);
+            *sum += (share * sigma).squared();
         }
     }
     variance.iter_mut().for_each(|v| *v = v.sqrt());
@@ -114,7 +115,7 @@ fn differences<'a>(
     let columns = space.radiance().iter().zip(space.weight());
     columns.zip(wanted.iter().zip(printed.iter().zip(sigma))).map(
         |((&c, &weight), (&wanted, (&printed, &sigma)))| {
-            let seen = |f: f64| weight * (f.max(0.0) * c).cbrt();
+            let seen = |f: f64| weight * (f.max(0.0) * c).cube_root();
             ((seen(wanted), seen(printed)), 0.5 * (seen(printed + sigma) - seen(printed - sigma)))
         },
     )

@@ -4,6 +4,7 @@
 //! are drawn in it. The plan stays a page of its own, `plan.html`, because it is printed and kept beside the printer. Names
 //! come from documents of unknown origin and appear as text.
 
+use maths::Maths;
 use std::fmt::{self, Write as _};
 
 use anyhow::Result;
@@ -251,7 +252,7 @@ fn draw_spectrum(spectrum: &Spectrum, eye: f64, page: &mut String) -> fmt::Resul
         )?;
     }
     // A degree covers so many millimetres.
-    let resolved = RESOLVED / (1000.0 * eye * 1f64.to_radians().tan());
+    let resolved = RESOLVED / (1000.0 * eye * 1f64.to_radians().tangent());
     if resolved < last {
         // Above the curve, and no farther to the side than the drawing reaches.
         write!(

@@ -11,6 +11,7 @@
 //! Source: Chen, Paris & Durand 2007 for the grid; Gonzalez 1985 for the kinds.
 
 use crate::brdf::Table;
+use maths::Maths;
 
 /// Distance between nodes in pixels. A window is two cells wide.
 pub(super) const CELL: usize = 16;
@@ -61,7 +62,7 @@ impl Regions {
         place.kinds.extend(self.kinds.rows().map(|kind| squared(kind, seen)));
         let nearest = place.kinds.iter().copied().fold(f64::INFINITY, f64::min);
         for kind in &mut place.kinds {
-            let w = ((nearest - *kind) / (2.0 * BLUR * BLUR)).exp();
+            let w = ((nearest - *kind) / (2.0 * BLUR * BLUR)).exponential();
             *kind = if w < LEAST { 0.0 } else { w };
         }
         let sum: f64 = place.kinds.iter().sum();
