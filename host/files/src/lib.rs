@@ -52,7 +52,7 @@ pub enum FileError {
         /// The file.
         path: PathBuf,
         /// What the decoder said.
-        source: png::DecodingError,
+        source: std::io::Error,
     },
     /// A picture is of another kind or size than the text beside it says.
     #[error("{}: expected {expected}, found {found}", path.display())]

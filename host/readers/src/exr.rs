@@ -10,11 +10,14 @@ use std::io::Cursor;
 use exr::meta::MetaData;
 use exr::prelude::{AnyChannel, FlatSamples, ReadChannels, ReadLayers};
 
+use crate::stored::Fault;
+
 /// The chromaticities (x, y) of red, green, blue and white.
 pub type Primaries = [[f32; 2]; 4];
 
 /// The values of a picture, interleaved, rows from the top.
-pub struct Floats {
+#[derive(Debug)]
+pub(crate) struct Floats {
     /// Pixels across.
     pub width: usize,
     /// Pixels down.
@@ -27,27 +30,33 @@ pub struct Floats {
     pub primaries: Option<Primaries>,
 }
 
-fn damaged(error: exr::error::Error) -> String {
-    format!("cannot decode the image: {error}")
+fn damaged(error: exr::error::Error) -> Fault {
+    Fault::Damaged(error.to_string())
 }
 
-/// Width, height and number of channels of each layer.
+/// Width and height, and the number of channels, of the part that has the most values.
 ///
 /// # Errors
-/// What is wrong with the file.
-pub fn exr_sizes(bytes: &[u8]) -> Result<Vec<(usize, usize, usize)>, String> {
+/// A damaged file.
+pub(crate) fn largest(bytes: &[u8]) -> Result<((u32, u32), usize), Fault> {
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
+    let side = |side: usize| u32::try_from(side).unwrap_or(u32::MAX);
     let size = |header: &exr::meta::header::Header| {
-        (header.layer_size.width(), header.layer_size.height(), header.channels.list.len())
+        let (width, height) = (side(header.layer_size.width()), side(header.layer_size.height()));
+        ((width, height), header.channels.list.len())
     };
-    Ok(meta.headers.iter().map(size).collect())
+    let values = |&((width, height), channels): &((u32, u32), usize)| {
+        u128::from(width) * u128::from(height) * channels as u128
+    };
+    let largest = meta.headers.iter().map(size).max_by_key(values);
+    largest.ok_or_else(|| Fault::Damaged("it has no part".into()))
 }
 
-/// Decodes a file; its sizes are the caller's to check ([`exr_sizes`]).
+/// Decodes a file; its size is the caller's to check ([`largest`]).
 ///
 /// # Errors
-/// What is wrong with the file.
-pub fn exr(bytes: &[u8]) -> Result<Floats, String> {
+/// A damaged file, or channels of which none is a picture.
+pub(crate) fn exr(bytes: &[u8]) -> Result<Floats, Fault> {
     let image = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -68,13 +77,14 @@ pub fn exr(bytes: &[u8]) -> Result<Floats, String> {
     let mut values = vec![0.0; width * height * channels];
     for (c, channel) in chosen.into_iter().enumerate() {
         if channel.sample_data.len() != width * height {
-            return Err(format!("channel {} is subsampled, which is not supported", channel.name));
+            let problem = format!("channel {} is subsampled, which is not supported", channel.name);
+            return Err(Fault::Kind(problem));
         }
         if matches!(channel.sample_data, FlatSamples::U32(_)) {
-            return Err(format!(
+            return Err(Fault::Kind(format!(
                 "channel {} holds whole numbers (UINT), which identify things; save it as half or float, 0 to 1",
                 channel.name
-            ));
+            )));
         }
         for (pixel, value) in values.chunks_exact_mut(channels).zip(channel.sample_data.values_as_f32()) {
             pixel[c] = value;
@@ -84,7 +94,7 @@ pub fn exr(bytes: &[u8]) -> Result<Floats, String> {
 }
 
 /// The channels that hold the picture.
-fn choose(list: &[AnyChannel<FlatSamples>]) -> Result<Vec<&AnyChannel<FlatSamples>>, String> {
+fn choose(list: &[AnyChannel<FlatSamples>]) -> Result<Vec<&AnyChannel<FlatSamples>>, Fault> {
     let names: Vec<String> = list.iter().map(|channel| channel.name.to_string()).collect();
     let split = |name: &str| {
         name.rfind('.').map_or((String::new(), name.to_owned()), |dot| {
@@ -109,16 +119,16 @@ fn choose(list: &[AnyChannel<FlatSamples>]) -> Result<Vec<&AnyChannel<FlatSample
             [("", places), ..] | [(_, places)] => return Ok(places.iter().map(|&i| &list[i]).collect()),
             several => {
                 let layers: Vec<&str> = several.iter().map(|(layer, _)| *layer).collect();
-                return Err(format!(
+                return Err(Fault::Kind(format!(
                     "several layers hold a picture ({}); save one of them",
                     layers.join(", ")
-                ));
+                )));
             }
         }
     }
     match list {
         [one] => Ok(vec![one]),
-        _ => Err(format!("expected the channels R, G, B or Y, found {}", names.join(", "))),
+        _ => Err(Fault::Kind(format!("expected the channels R, G, B or Y, found {}", names.join(", ")))),
     }
 }
 
@@ -168,9 +178,9 @@ mod tests {
         let plain: Vec<(String, FlatSamples)> =
             ["R", "G", "B"].map(|c| (c.to_owned(), floats(7.0, 7.0))).to_vec();
         assert_eq!(all(&[combined.clone(), plain]).unwrap().values[0], 7.0);
-        let error = all(&[combined, layered("ViewLayer.DiffCol.")]).err().unwrap();
+        let error = all(&[combined, layered("ViewLayer.DiffCol.")]).unwrap_err().to_string();
         assert!(error.contains("ViewLayer.Combined, ViewLayer.DiffCol"), "{error}");
-        let error = all(&[depth, vec![("V".into(), floats(0.0, 0.0))]]).err().unwrap();
+        let error = all(&[depth, vec![("V".into(), floats(0.0, 0.0))]]).unwrap_err().to_string();
         assert!(error.contains("V, ViewLayer.Depth.Z") || error.contains("ViewLayer.Depth.Z, V"), "{error}");
     }
 
@@ -185,7 +195,7 @@ mod tests {
 
     #[test]
     fn whole_numbers_are_refused_and_primaries_returned() {
-        let error = exr(&written(&[("Y", FlatSamples::U32(vec![1, 2]))], None)).err().unwrap();
+        let error = exr(&written(&[("Y", FlatSamples::U32(vec![1, 2]))], None)).unwrap_err().to_string();
         assert!(error.contains("channel Y holds whole numbers"), "{error}");
         let found = exr(&written(&[("Y", floats(0.5, 1.0))], Some(0.625))).unwrap();
         assert_eq!(found.primaries, Some([[0.625, 0.25], [0.125, 0.75], [0.125, 0.0625], [0.3125, 0.375]]));

@@ -8,11 +8,18 @@ use ::tiff::ColorType;
 use ::tiff::decoder::DecodingResult;
 use ::tiff::tags::Tag;
 
+use image::metadata::Orientation;
+
 use crate::exr::Floats;
 use crate::resolution::{TiffDecoder, tiff_decoder};
+use crate::stored::Fault;
+
+fn damaged(error: ::tiff::TiffError) -> Fault {
+    Fault::Damaged(error.to_string())
+}
 
 /// A TIFF with samples in floating point, whose header was read.
-pub struct FloatTiff<'a> {
+pub(crate) struct FloatTiff<'a> {
     decoder: TiffDecoder<'a>,
     size: (u32, u32),
     channels: usize,
@@ -22,7 +29,7 @@ pub struct FloatTiff<'a> {
 ///
 /// # Errors
 /// A kind of pixels that is not decoded.
-pub fn float_tiff(bytes: &[u8]) -> Result<Option<FloatTiff<'_>>, String> {
+pub(crate) fn float_tiff(bytes: &[u8]) -> Result<Option<FloatTiff<'_>>, Fault> {
     const FLOAT: u16 = 3;
     let Some(mut decoder) = tiff_decoder(bytes) else { return Ok(None) };
     match decoder.find_tag_unsigned_vec::<u16>(Tag::SampleFormat) {
@@ -31,7 +38,7 @@ pub fn float_tiff(bytes: &[u8]) -> Result<Option<FloatTiff<'_>>, String> {
     }
     let (size, colour) = match (decoder.dimensions(), decoder.colortype()) {
         (Ok(size), Ok(colour)) => (size, colour),
-        (Err(error), _) | (_, Err(error)) => return Err(format!("cannot decode the image: {error}")),
+        (Err(error), _) | (_, Err(error)) => return Err(damaged(error)),
     };
     let channels = match colour {
         ColorType::Gray(_) => 1,
@@ -39,9 +46,9 @@ pub fn float_tiff(bytes: &[u8]) -> Result<Option<FloatTiff<'_>>, String> {
         ColorType::RGB(_) => 3,
         ColorType::RGBA(_) => 4,
         other => {
-            return Err(format!(
+            return Err(Fault::Kind(format!(
                 "floating-point pixels of type {other:?} are not supported; save it as RGB or grey"
-            ));
+            )));
         }
     };
     Ok(Some(FloatTiff { decoder, size, channels }))
@@ -58,24 +65,36 @@ impl FloatTiff<'_> {
         self.channels
     }
 
+    /// How to turn it before it is shown, as its tag states.
+    pub fn turn(&mut self) -> Orientation {
+        let stated = self.decoder.find_tag_unsigned::<u8>(Tag::Orientation).ok().flatten();
+        stated.and_then(Orientation::from_exif).unwrap_or(Orientation::NoTransforms)
+    }
+
     /// Its pixels; the size is the caller's to check.
     ///
     /// # Errors
-    /// What is wrong with the file.
-    pub fn decode(mut self) -> Result<Floats, String> {
-        let damaged = |error: ::tiff::TiffError| format!("cannot decode the image: {error}");
+    /// A damaged file, or samples of another depth.
+    pub fn decode(mut self) -> Result<Floats, Fault> {
         let mut decoded = DecodingResult::F32(Vec::new());
         self.decoder.read_image_to_buffer(&mut decoded).map_err(damaged)?;
         let mut values: Vec<f32> = match decoded {
             DecodingResult::F16(values) => values.into_iter().map(f32::from).collect(),
             DecodingResult::F32(values) => values,
             DecodingResult::F64(values) => values.into_iter().map(|v| v as f32).collect(),
-            _ => return Err("its samples have neither 16, 32 nor 64 bits; save it with 32 bits".into()),
+            _ => {
+                let problem = "its samples have neither 16, 32 nor 64 bits; save it with 32 bits";
+                return Err(Fault::Kind(problem.into()));
+            }
         };
         let (width, height) = (self.size.0 as usize, self.size.1 as usize);
         let (pixels, channels) = (width * height, self.channels);
         if values.len() != pixels * channels {
-            return Err(format!("it has {} values; its header states {}", values.len(), pixels * channels));
+            let stated = pixels * channels;
+            return Err(Fault::Damaged(format!(
+                "it has {} values; its header states {stated}",
+                values.len()
+            )));
         }
         const PLANES: u16 = 2;
         let layout = self.decoder.find_tag_unsigned::<u16>(Tag::PlanarConfiguration).map_err(damaged)?;

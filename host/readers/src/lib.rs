@@ -1,32 +1,33 @@
-//! Pictures in files: decoding within limits, encoding as PNG, and the resolution that a file states.
+//! Pictures in files: decoding within limits, encoding, and what a file states of its picture.
 //!
-//! Problem: documents, flat art, light probes, photographs and pictures for screens come in the same formats. Decoders are
-//! generic code that each caller would compile again.
+//! Problem: documents, flat art, light probes, photographs and pictures for screens come in the same formats. Each caller would
+//! judge them anew, and compile the decoders again.
 //! Method: decoders read bytes in memory and are compiled here. A file is opened first ([`open`]), which tells its size, so that the
 //! caller's own limits come before anything of that size is allocated; then it is decoded.
 //! Cost: the bytes of the file in memory beside its pixels. Limits: see each format; of an animation the first picture.
 
 mod chunks;
+pub mod exact;
+mod exif;
 mod exr;
 mod floats;
 mod jpeg;
+mod pixels;
 pub mod resolution;
+mod stored;
 
 use std::io::Cursor;
 use std::path::Path;
 
-use image::codecs::hdr::HdrDecoder;
-use image::codecs::png::PngEncoder;
 use image::error::{DecodingError, ImageError};
 use image::metadata::Orientation;
-use image::{
-    ColorType, DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageFormat, ImageReader,
-    ImageResult, Limits,
-};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, ImageResult, Limits};
 
 pub use chunks::{MOST_PROFILE, gamma};
-pub use exr::{Floats, Primaries, exr, exr_sizes};
-pub use floats::{FloatTiff, float_tiff};
+pub use exif::{Exif, exif};
+pub use exr::Primaries;
+pub use pixels::{Kind, Pixels, open_exr, png};
+pub use stored::{Fault, Format, Header, Samples, Stored};
 
 /// The format of a file by its first bytes; Targa files, which have no signature, by the ending of their name.
 pub fn format(bytes: &[u8], path: &Path) -> Option<ImageFormat> {
@@ -108,25 +109,4 @@ fn limits(bounds: Bounds) -> Limits {
     (limits.max_image_width, limits.max_image_height) = (bounds.side, bounds.side);
     limits.max_alloc = Some(bounds.bytes);
     limits
-}
-
-/// Reads the header of a Radiance picture, and the exposure that its pixels were multiplied by.
-///
-/// # Errors
-/// A damaged file, or a larger picture than allowed.
-pub fn open_radiance(bytes: &[u8], bounds: Bounds) -> ImageResult<(Opened<'_>, f32)> {
-    let mut decoder = HdrDecoder::new(Cursor::new(bytes))?;
-    let exposure = decoder.metadata().exposure.unwrap_or(1.0);
-    decoder.set_limits(limits(bounds))?;
-    Ok((Opened { decoder: Box::new(decoder) }, exposure))
-}
-
-/// A picture as the bytes of a PNG. Samples of 16 bits are in the order of this computer's bytes.
-///
-/// # Errors
-/// A number of samples that differs from the size.
-pub fn png(samples: &[u8], size: (u32, u32), colour: ExtendedColorType) -> ImageResult<Vec<u8>> {
-    let mut bytes = Vec::new();
-    PngEncoder::new(&mut bytes).write_image(samples, size.0, size.1, colour)?;
-    Ok(bytes)
 }

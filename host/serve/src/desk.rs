@@ -322,19 +322,17 @@ fn about(data: &Data, job: &Job) -> Value {
 /// A sheet with a leaf of foil on it, 128 x 128 pixels.
 fn icon() -> Vec<u8> {
     const SIDE: u32 = 128;
-    let picture = image::RgbImage::from_fn(SIDE, SIDE, |x, y| {
+    let picture = readers::Pixels::from_fn(SIDE, SIDE, |x, y| {
         let (dx, dy) = (f64::from(x) - 64.0, f64::from(y) - 70.0);
         let leaf = dx.abs() < 26.0 * (1.0 - (dy / 40.0) * (dy / 40.0)).max(0.0);
         match (12..116).contains(&x) && (6..122).contains(&y) {
-            true if leaf && dx.abs() > 1.5 => image::Rgb([225, 160, 0]),
-            true => image::Rgb([250, 250, 246]),
-            false => image::Rgb([40, 60, 90]),
+            true if leaf && dx.abs() > 1.5 => [225, 160, 0],
+            true => [250, 250, 246],
+            false => [40, 60, 90],
         }
     });
-    let mut bytes = std::io::Cursor::new(Vec::new());
     // Into memory nothing fails.
-    let _ = picture.write_to(&mut bytes, image::ImageFormat::Png);
-    bytes.into_inner()
+    picture.png().unwrap_or_default()
 }
 
 #[cfg(test)]

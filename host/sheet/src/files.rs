@@ -9,9 +9,10 @@ use protocol::rgl::Resolution;
 use serde::{Deserialize, Serialize};
 
 use super::colours::colours;
-use super::picture::{Kind, read_png, write_png};
+use super::picture::{read_png, write_png};
 use super::{Area, DotMap, Sheet, check_stacks};
 use files::{FileError, read_toml, write_toml};
+use readers::exact::Exact;
 
 /// The text of a sheet.
 const SHEET: &str = "sheet.toml";
@@ -106,7 +107,7 @@ impl DotMap {
         let colours = colours(self.stacks());
         let size = (self.width(), self.length());
         let dpi = Resolution::Dpi600.dpi();
-        write_png(&folder.join(PICTURE), size, dpi, Kind::Indexed(&colours), self.index())
+        write_png(&folder.join(PICTURE), size, dpi, Exact::Indexed(&colours), self.index())
     }
 
     fn load_picture(
@@ -116,7 +117,7 @@ impl DotMap {
     ) -> Result<DotMap, FileError> {
         let picture = folder.join(PICTURE);
         let (width, length) = (width.into(), length.into());
-        let index = read_png(&picture, (width, length), Kind::Indexed(&colours(&stacks)))?;
+        let index = read_png(&picture, (width, length), Exact::Indexed(&colours(&stacks)))?;
         DotMap::new(width, length, stacks, index)
             .map_err(|error| FileError::Text { path: picture, problem: error.to_string() })
     }
@@ -195,7 +196,7 @@ impl Sheet {
     pub fn save_colours(&self, area: Area, dpi: (u16, u16), path: &Path) -> Result<(), FileError> {
         let rows = self.index().chunks_exact(self.width()).skip(area.top).take(area.length);
         let dots: Vec<u8> = rows.flat_map(|row| &row[area.left..][..area.width]).copied().collect();
-        write_png(path, (area.width, area.length), dpi, Kind::Indexed(&colours(self.stacks())), &dots)
+        write_png(path, (area.width, area.length), dpi, Exact::Indexed(&colours(self.stacks())), &dots)
     }
 
     /// Reads what [`Sheet::save`] wrote. Anything that does not fit is an error with the file and the field.
@@ -313,14 +314,14 @@ mod tests {
             std::fs::write(&picture, &bytes[..length]).unwrap();
             assert!(Sheet::load(folder.path()).is_err(), "{length} of {} bytes", bytes.len());
         }
-        super::write_png(&picture, (9, 7), (600, 600), Kind::Bits, &[0; 14]).unwrap();
+        super::write_png(&picture, (9, 7), (600, 600), Exact::Bits, &[0; 14]).unwrap();
         assert!(
             Sheet::load(folder.path())
                 .unwrap_err()
                 .to_string()
                 .contains("found 9 x 7 dots, One bits Grayscale")
         );
-        super::write_png(&picture, (9, 7), (600, 600), Kind::Indexed(&[[0; 3]; 3]), &[3; 63]).unwrap();
+        super::write_png(&picture, (9, 7), (600, 600), Exact::Indexed(&[[0; 3]; 3]), &[3; 63]).unwrap();
         assert!(
             Sheet::load(folder.path()).unwrap_err().to_string().contains("dot (0, 0) has stack number 3")
         );

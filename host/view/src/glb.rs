@@ -13,7 +13,6 @@
 use appearance::brdf::Space;
 use appearance::materials::{Metallic, Widths};
 use appearance::srgb;
-use image::ExtendedColorType;
 use observe::Observer;
 use rayon::prelude::*;
 use serde_json::json;
@@ -88,9 +87,7 @@ pub fn glb(lit: &Lit, space: &Space, name: &str, observer: &dyn Observer) -> Res
     let texture = |texel: &dyn Fn(&Texel) -> [u8; 3]| {
         let bytes: Vec<u8> = texels.iter().flat_map(texel).collect();
         let size = (level.width as u32, level.height as u32);
-        Ok::<_, ViewError>(
-            readers::png(&bytes, size, ExtendedColorType::Rgb8).map_err(std::io::Error::other)?,
-        )
+        readers::png(&bytes, size, readers::Kind::Rgb)
     };
     // Red is free; occlusion, which some programs expect there, is none.
     let surfaces = texture(&|texel| [255, texel.roughness, texel.metallic])?;

@@ -8,7 +8,6 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
 
-use image::ExtendedColorType;
 use inks::Curve;
 use serde::{Deserialize, Serialize};
 
@@ -123,8 +122,8 @@ pub fn write(
         }
         let at = inside.join(&file);
         let mut output = std::fs::File::create_new(&at).map_err(io(&at, "write"))?;
-        let picture = readers::png(&row, (width as u32, height as u32), ExtendedColorType::L16)
-            .map_err(|error| io(&at, "write")(std::io::Error::other(error)))?;
+        let picture = readers::png(&row, (width as u32, height as u32), readers::Kind::Grey16)
+            .map_err(io(&at, "write"))?;
         output.write_all(&picture).map_err(io(&at, "write"))?;
         maps.push(file);
     }

@@ -6,8 +6,8 @@
 use maths::Maths;
 use std::path::Path;
 
-use image::{DynamicImage, ImageFormat};
 use rayon::prelude::*;
+use readers::{Bounds, Fault, Format, Samples, Stored};
 
 use super::content::ColourSpace;
 use super::error::DocumentError;
@@ -28,16 +28,8 @@ const MOST_VALUES: u64 = 1 << 28;
 /// The most values of floating point in one image: they take four bytes each, and twice that while they are decoded.
 const MOST_FLOATS: u64 = 1 << 26;
 
-/// The values of an image, interleaved, rows from the top.
-#[derive(Clone, Debug)]
-enum Values {
-    /// 0..=255 for 0..=1.
-    Eight(Vec<u8>),
-    /// 0..=65535 for 0..=1.
-    Sixteen(Vec<u16>),
-    /// Unscaled; finite.
-    Float(Vec<f32>),
-}
+/// The formats of maps.
+const FORMATS: [&str; 8] = ["PNG", "JPEG", "TIFF", "WebP", "Targa", "BMP", "Radiance HDR", "OpenEXR"];
 
 /// A decoded image with 1 to 4 channels: grey, grey and alpha, RGB, or RGB and alpha.
 #[derive(Clone, Debug)]
@@ -47,14 +39,12 @@ pub struct Picture {
     /// Pixels down, at least 1.
     pub height: usize,
     channels: usize,
-    values: Values,
+    values: Samples,
     foreign_profile: bool,
     /// The power that a PNG states for its values.
     gamma: Option<f64>,
     /// To linear Rec. 709, if a file states other primaries.
     matrix: Option<[[f64; 3]; 3]>,
-    /// Whether the file says that it is turned before it is shown.
-    turned: bool,
 }
 
 /// How numbers encode colours.
@@ -105,43 +95,54 @@ impl Picture {
         source: &mut Source<'_>,
     ) -> Result<Picture, DocumentError> {
         let wrong = |problem: String| DocumentError::Picture { path: path.to_path_buf(), problem };
-        let format = readers::format(bytes, path);
-        let Some((format, kind)) = format.and_then(|format| Some((format, kind(format)?))) else {
-            let found = if bytes.is_empty() { "an empty file" } else { "another format" };
-            return Err(wrong(format!(
-                "expected a PNG, JPEG, TIFF, WebP, Targa, BMP, OpenEXR or Radiance HDR image, found {found}"
-            )));
-        };
-        if let Ok(named) = ImageFormat::from_path(path)
-            && named != format
-        {
+        let format = Format::of(bytes, path).and_then(|format| match FORMATS.contains(&format.name()) {
+            true => Ok(format),
+            false => Err(Fault::Unknown("another format")),
+        });
+        let format = format.map_err(|fault| {
+            wrong(format!(
+                "expected a PNG, JPEG, TIFF, WebP, Targa, BMP, OpenEXR or Radiance HDR image, {fault}"
+            ))
+        })?;
+        if format.contradicts(path) {
+            let kind = format.name();
             source.note(format!("{}: read as {kind}, which it is despite its name", path.display()));
         }
-        let floats = match format {
-            ImageFormat::OpenExr => Some(decode_exr(bytes, path)?),
-            ImageFormat::Tiff => decode_floats(bytes, path)?,
-            _ => None,
+        let unread = |fault: Fault| {
+            wrong(match fault {
+                Fault::Large(_) => format!(
+                    "the image has more than {MOST_SIDE} pixels along a side or needs too much memory; \
+                     make it smaller"
+                ),
+                Fault::Unsupported(said) => {
+                    format!(
+                        "cannot decode the image: {said}; save it as an 8-bit or 16-bit PNG, or as OpenEXR"
+                    )
+                }
+                Fault::Damaged(said) => format!("cannot decode the image: {said}"),
+                Fault::Kind(_) | Fault::Unknown(_) => fault.to_string(),
+            })
         };
-        let picture = match floats {
-            Some(picture) => picture,
-            None => {
-                // The decoder knows only one of the two signatures of a Radiance file.
-                let renamed = bytes.strip_prefix(b"#?RGBE").map(|rest| [b"#?RADIANCE", rest].concat());
-                decode_image(renamed.as_deref().unwrap_or(bytes), format, path)?
-            }
-        };
-        if let Values::Float(values) = &picture.values
-            && let Some(at) = values.iter().position(|v| !v.is_finite())
-        {
-            let (pixel, channel) = (at / picture.channels, at % picture.channels);
+        let bounds = Bounds { side: Some(MOST_SIDE as u32), bytes: 4 * MOST_VALUES };
+        let header = format.open(bytes, bounds).map_err(unread)?;
+        let most = if header.is_float() { MOST_FLOATS } else { MOST_VALUES };
+        check_size(path, header.size(), header.channels() as u64, most)?;
+        let stored = header.decode().map_err(unread)?;
+        if let Some((at, value)) = stored.samples.not_finite() {
+            let (pixel, channel) = (at / stored.channels, at % stored.channels);
             return Err(wrong(format!(
-                "pixel ({}, {}) channel {channel} is {}, not a finite number",
-                pixel % picture.width,
-                pixel / picture.width,
-                values[at]
+                "pixel ({}, {}) channel {channel} is {value}, not a finite number",
+                pixel % stored.width,
+                pixel / stored.width,
             )));
         }
-        if picture.turned {
+        let turned = stored.is_turned();
+        let Stored { width, height, channels, samples: values, profile, gamma, primaries, .. } = stored;
+        let matrix = primaries.as_ref().map_or(Ok(None), to_rec_709).map_err(wrong)?;
+        // A damaged profile does not matter.
+        let foreign_profile = profile.is_some_and(|bytes| !is_srgb(&bytes));
+        let picture = Picture { width, height, channels, values, foreign_profile, gamma, matrix };
+        if turned {
             source.note(format!(
                 "{}: the file says that it is turned before it is shown (orientation); maps are read as they are stored",
                 path.display()
@@ -152,7 +153,7 @@ impl Picture {
 
     /// Whether the values are floating point, as in EXR and HDR files.
     pub fn is_float(&self) -> bool {
-        matches!(self.values, Values::Float(_))
+        matches!(self.values, Samples::Float(_))
     }
 
     /// Whether it has a colour profile other than sRGB. Profiles are never applied, and data maps do not need them.
@@ -163,7 +164,7 @@ impl Picture {
     /// The values of a 16-bit grey image, 0 to 65535.
     pub fn sixteen(&self) -> Option<&[u16]> {
         match &self.values {
-            Values::Sixteen(values) if self.channels == 1 => Some(values),
+            Samples::Sixteen(values) if self.channels == 1 => Some(values),
             _ => None,
         }
     }
@@ -188,9 +189,9 @@ impl Picture {
     fn is_opaque(&self) -> bool {
         let (channels, last) = (self.channels, self.channels - 1);
         match &self.values {
-            Values::Eight(v) => v.chunks_exact(channels).all(|p| p[last] == u8::MAX),
-            Values::Sixteen(v) => v.chunks_exact(channels).all(|p| p[last] == u16::MAX),
-            Values::Float(v) => v.chunks_exact(channels).all(|p| p[last] >= 1.0),
+            Samples::Eight(v) => v.chunks_exact(channels).all(|p| p[last] == u8::MAX),
+            Samples::Sixteen(v) => v.chunks_exact(channels).all(|p| p[last] == u16::MAX),
+            Samples::Float(v) => v.chunks_exact(channels).all(|p| p[last] >= 1.0),
         }
     }
 
@@ -206,13 +207,13 @@ impl Picture {
         };
         let (width, height, channels) = (self.width, self.height, self.channels);
         match &self.values {
-            Values::Eight(v) => {
+            Samples::Eight(v) => {
                 Plane::eight(width, height, v.par_chunks_exact(channels).map(|p| p[at]).collect())
             }
-            Values::Sixteen(v) => {
+            Samples::Sixteen(v) => {
                 Plane::sixteen(width, height, v.par_chunks_exact(channels).map(|p| p[at]).collect())
             }
-            Values::Float(v) => {
+            Samples::Float(v) => {
                 Plane::new(width, height, v.par_chunks_exact(channels).map(|p| p[at]).collect())
             }
         }
@@ -262,22 +263,14 @@ fn is_srgb(profile: &[u8]) -> bool {
     profile.windows(4).any(|w| w == b"sRGB") || profile.windows(8).any(|w| w == b"\0s\0R\0G\0B")
 }
 
-fn kind(format: ImageFormat) -> Option<&'static str> {
-    match format {
-        ImageFormat::Png => Some("PNG"),
-        ImageFormat::Jpeg => Some("JPEG"),
-        ImageFormat::Tiff => Some("TIFF"),
-        ImageFormat::WebP => Some("WebP"),
-        ImageFormat::Tga => Some("Targa"),
-        ImageFormat::Bmp => Some("BMP"),
-        ImageFormat::Hdr => Some("Radiance HDR"),
-        ImageFormat::OpenExr => Some("OpenEXR"),
-        _ => None,
-    }
-}
-
 /// Checks that a size is plausible, before anything is allocated.
-fn check_size(path: &Path, width: u64, height: u64, channels: u64, most: u64) -> Result<(), DocumentError> {
+fn check_size(
+    path: &Path,
+    (width, height): (u32, u32),
+    channels: u64,
+    most: u64,
+) -> Result<(), DocumentError> {
+    let (width, height) = (u64::from(width), u64::from(height));
     let large = |field: &str, found, most| {
         Err(DocumentError::Large { path: path.to_path_buf(), field: field.into(), found, most })
     };
@@ -295,96 +288,4 @@ fn check_size(path: &Path, width: u64, height: u64, channels: u64, most: u64) ->
         return large("the number of values", width * height * channels, most);
     }
     Ok(())
-}
-
-fn decode_image(bytes: &[u8], format: ImageFormat, path: &Path) -> Result<Picture, DocumentError> {
-    let wrong = |problem: String| DocumentError::Picture { path: path.to_path_buf(), problem };
-    let damaged = |error: image::ImageError| {
-        wrong(match &error {
-            image::ImageError::Limits(_) => {
-                format!(
-                    "the image has more than {MOST_SIDE} pixels along a side or needs too much memory; \
-                     make it smaller"
-                )
-            }
-            image::ImageError::Unsupported(_) => {
-                format!("cannot decode the image: {error}; save it as an 8-bit or 16-bit PNG, or as OpenEXR")
-            }
-            _ => format!("cannot decode the image: {error}"),
-        })
-    };
-    let bounds = readers::Bounds { side: Some(MOST_SIDE as u32), bytes: 4 * MOST_VALUES };
-    let mut opened = readers::open(bytes, format, bounds).map_err(damaged)?;
-    let ((width, height), colour) = (opened.size(), opened.colour());
-    let channels = u64::from(colour.channel_count());
-    let most = if u64::from(colour.bytes_per_pixel()) == 4 * channels { MOST_FLOATS } else { MOST_VALUES };
-    check_size(path, u64::from(width), u64::from(height), channels, most)?;
-    // A damaged profile does not matter.
-    let foreign_profile = opened.profile().is_some_and(|bytes| !is_srgb(&bytes));
-    let turned = opened.orientation() != image::metadata::Orientation::NoTransforms;
-    let decoded = opened.decode().map_err(damaged)?;
-    let gamma = if format == ImageFormat::Png { readers::gamma(bytes) } else { None };
-    let (width, height) = (decoded.width() as usize, decoded.height() as usize);
-    let picture = |channels, values| Picture {
-        width,
-        height,
-        channels,
-        values,
-        foreign_profile,
-        gamma,
-        matrix: None,
-        turned,
-    };
-    Ok(match decoded {
-        DynamicImage::ImageLuma8(p) => picture(1, Values::Eight(p.into_raw())),
-        DynamicImage::ImageLumaA8(p) => picture(2, Values::Eight(p.into_raw())),
-        DynamicImage::ImageRgb8(p) => picture(3, Values::Eight(p.into_raw())),
-        DynamicImage::ImageRgba8(p) => picture(4, Values::Eight(p.into_raw())),
-        DynamicImage::ImageLuma16(p) => picture(1, Values::Sixteen(p.into_raw())),
-        DynamicImage::ImageLumaA16(p) => picture(2, Values::Sixteen(p.into_raw())),
-        DynamicImage::ImageRgb16(p) => picture(3, Values::Sixteen(p.into_raw())),
-        DynamicImage::ImageRgba16(p) => picture(4, Values::Sixteen(p.into_raw())),
-        DynamicImage::ImageRgb32F(p) => picture(3, Values::Float(p.into_raw())),
-        DynamicImage::ImageRgba32F(p) => picture(4, Values::Float(p.into_raw())),
-        other => {
-            return Err(wrong(format!(
-                "pixels of type {:?} are not supported; save the image as RGB",
-                other.color()
-            )));
-        }
-    })
-}
-
-fn decode_exr(bytes: &[u8], path: &Path) -> Result<Picture, DocumentError> {
-    let wrong = |problem: String| DocumentError::Picture { path: path.to_path_buf(), problem };
-    for (width, height, channels) in readers::exr_sizes(bytes).map_err(wrong)? {
-        check_size(path, width as u64, height as u64, channels as u64, MOST_FLOATS)?;
-    }
-    of_floats(readers::exr(bytes).map_err(wrong)?, path)
-}
-
-/// A TIFF with floating-point samples; `None` if they are whole numbers.
-fn decode_floats(bytes: &[u8], path: &Path) -> Result<Option<Picture>, DocumentError> {
-    let wrong = |problem: String| DocumentError::Picture { path: path.to_path_buf(), problem };
-    let Some(file) = readers::float_tiff(bytes).map_err(wrong)? else { return Ok(None) };
-    let (width, height) = file.size();
-    check_size(path, u64::from(width), u64::from(height), file.channels() as u64, MOST_FLOATS)?;
-    of_floats(file.decode().map_err(wrong)?, path).map(Some)
-}
-
-fn of_floats(floats: readers::Floats, path: &Path) -> Result<Picture, DocumentError> {
-    let readers::Floats { width, height, channels, values, primaries } = floats;
-    let matrix = primaries.as_ref().map_or(Ok(None), to_rec_709);
-    let matrix = matrix.map_err(|problem| DocumentError::Picture { path: path.to_path_buf(), problem })?;
-    let values = Values::Float(values);
-    Ok(Picture {
-        width,
-        height,
-        channels,
-        values,
-        foreign_profile: false,
-        gamma: None,
-        matrix,
-        turned: false,
-    })
 }

@@ -17,11 +17,11 @@ pub fn write_sample(sample: &Sample, folder: &Path) -> Result<(), DocumentError>
         move |source| DocumentError::Io { path, attempt: "write", source }
     };
     let painting = sample.draw();
-    for (file, data, colour) in painting.maps() {
+    for (file, data, kind) in painting.maps() {
         let path = folder.join(file);
         let mut output = std::fs::File::create_new(&path).map_err(io(&path))?;
-        let picture = readers::png(&data, (painting.width as u32, painting.height as u32), colour)
-            .map_err(|error| io(&path)(std::io::Error::other(error)))?;
+        let picture =
+            readers::png(&data, (painting.width as u32, painting.height as u32), kind).map_err(io(&path))?;
         output.write_all(&picture).map_err(io(&path))?;
     }
     let settings = FolderSettings {

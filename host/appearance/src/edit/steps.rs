@@ -30,7 +30,6 @@
 use std::io::{BufWriter, Write as _};
 use std::path::{Component, Path, PathBuf};
 
-use image::ExtendedColorType;
 use observe::Observer;
 use serde::{Deserialize, Serialize};
 
@@ -237,8 +236,7 @@ fn write_mask(painted: &Painted, at: &Path) -> Result<(), DocumentError> {
     let mut output = std::fs::File::create_new(at).map_err(io)?;
     let greys: Vec<u8> = painted.values.iter().flat_map(|&w| to_grey(w).to_ne_bytes()).collect();
     let size = (painted.width as u32, painted.height as u32);
-    let picture = readers::png(&greys, size, ExtendedColorType::L16)
-        .map_err(|error| io(std::io::Error::other(error)))?;
+    let picture = readers::png(&greys, size, readers::Kind::Grey16).map_err(io)?;
     output.write_all(&picture).map_err(io)
 }
 

@@ -1,6 +1,6 @@
 //! The maps of a sample, and the surfaces they define.
 
-use image::ExtendedColorType;
+use readers::Kind;
 
 use crate::brdf::Space;
 use crate::materials::{Surfaces, dielectric, metallic, specular};
@@ -41,9 +41,9 @@ pub(crate) struct Painting {
 }
 
 impl Painting {
-    /// The files of the painting: name, pixels and their type.
-    pub fn maps(&self) -> Vec<(&'static str, Vec<u8>, ExtendedColorType)> {
-        let (grey, rgb) = (ExtendedColorType::L8, ExtendedColorType::Rgb8);
+    /// The files of the painting: name, samples and their kind.
+    pub fn maps(&self) -> Vec<(&'static str, Vec<u8>, Kind)> {
+        let (grey, rgb) = (Kind::Grey, Kind::Rgb);
         match &self.finish {
             Finish::Metallic { roughness, metallic } => vec![
                 ("base_color.png", self.base.concat(), rgb),

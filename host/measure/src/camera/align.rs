@@ -459,7 +459,8 @@ fn search(a: &Logs, b: &Logs) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::photo::{Photo, Values};
+    use crate::camera::photo::Photo;
+    use readers::Samples;
 
     /// Soft discs on a ground, moved by a shift, at an exposure.
     fn scene(shift: [f64; 2], exposure: f64, other: f64) -> Tones {
@@ -476,7 +477,7 @@ mod tests {
                 [(light * exposure * 60_000.0).clamp(0.0, 65_535.0) as u16; 3]
             })
             .collect();
-        let photo = Photo { width, height, values: Values::Sixteen(values) };
+        let photo = Photo { width, height, values: Samples::Sixteen(values) };
         let probe = Probe::new(&photo, &photo);
         Tones::new(&probe, &Response::Linear, Noise { gain: 1.0, read: 4.0 }, [65_535.0; 3], exposure)
     }

@@ -8,9 +8,10 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::photo::{self, Photo, Values};
+use super::photo::{self, Photo};
 use super::probe::CLIPPED;
 use crate::MeasureError;
+use readers::Samples;
 
 /// The least share of the mean that a flat field divides by: below it there is no picture, only noise.
 const LEAST_FIELD: f32 = 0.02;
@@ -114,7 +115,7 @@ impl Frames {
         let values = (0..count)
             .into_par_iter()
             .map(|i| (photo.at(i) - dark(i)) * mean[i % 3] / field(i).max(LEAST_FIELD * mean[i % 3]));
-        Photo { values: Values::Float(values.collect()), width: photo.width, height: photo.height }
+        Photo { values: Samples::Float(values.collect()), width: photo.width, height: photo.height }
     }
 
     /// Corrects a photograph of a sensor that is full at `white`.
@@ -136,7 +137,7 @@ mod tests {
     use super::*;
 
     fn photo(values: [f32; 6]) -> Photo {
-        Photo { width: 2, height: 1, values: Values::Float(values.to_vec()) }
+        Photo { width: 2, height: 1, values: Samples::Float(values.to_vec()) }
     }
 
     /// The right pixel of each channel is full at 21; the left, in the dim part of the field, only looks as bright afterwards.
@@ -152,7 +153,7 @@ mod tests {
         for c in 0..3 {
             assert!(!clean.is_full(c, c) && clean.is_full(3 + c, c), "{c}");
         }
-        let small = Photo { width: 1, height: 1, values: Values::Eight(vec![0; 3]) };
+        let small = Photo { width: 1, height: 1, values: Samples::Eight(vec![0; 3]) };
         let error = frames.fits(&small, Path::new("a.png")).unwrap_err().to_string();
         assert!(error.contains("a.png: 1 x 1 pixels"), "{error}");
     }

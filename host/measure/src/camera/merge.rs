@@ -19,10 +19,11 @@ use super::align::Tones;
 use super::chain;
 use super::files;
 use super::frames::{Developed, FULL, Frames};
-use super::photo::{self, Exif};
+use super::photo;
 use super::probe::{CLIPPED, Noise, Probe, white};
 use super::response::Response;
 use crate::MeasureError;
+use readers::Exif;
 
 /// Below so many standard deviations of noise a photograph is not used where longer ones are: sensors cut noise off at zero, so that
 /// it reads too bright, and it has next to no weight.

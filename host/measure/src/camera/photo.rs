@@ -10,10 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use exif::{In, Tag};
-use image::DynamicImage;
-use image::metadata::Orientation;
-use readers::Bounds;
+use readers::{Bounds, Exif, Format, Samples};
 
 use crate::MeasureError;
 
@@ -35,32 +32,6 @@ const DEVELOPERS: [(&str, &[&str]); 2] = [
     ("dcraw", &["-4", "-T", "-W", "-o", "0", "-r", "1", "1", "1", "1", "-c"]),
 ];
 
-/// What a photograph's file says about how it was taken.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Exif {
-    /// Exposure time in seconds.
-    pub seconds: Option<f64>,
-    /// The aperture's f-number.
-    pub aperture: Option<f64>,
-    /// Sensitivity.
-    pub iso: Option<f64>,
-    /// The focal length that gives the same picture on 35 mm film, in millimetres.
-    pub film_focal_mm: Option<f64>,
-    /// Which side is up, 1 to 8.
-    pub orientation: Option<u8>,
-}
-
-/// The values of a photograph, RGB interleaved, rows from the top.
-#[derive(Clone, Debug)]
-pub enum Values {
-    /// 0 to 255.
-    Eight(Vec<u8>),
-    /// 0 to 65535.
-    Sixteen(Vec<u16>),
-    /// Any scale.
-    Float(Vec<f32>),
-}
-
 /// A photograph.
 #[derive(Clone, Debug)]
 pub struct Photo {
@@ -68,8 +39,8 @@ pub struct Photo {
     pub width: usize,
     /// Pixels down.
     pub height: usize,
-    /// Its values.
-    pub values: Values,
+    /// Its values, RGB interleaved, rows from the top.
+    pub values: Samples,
 }
 
 impl Photo {
@@ -77,9 +48,9 @@ impl Photo {
     #[inline]
     pub fn at(&self, i: usize) -> f32 {
         match &self.values {
-            Values::Eight(v) => f32::from(v[i]),
-            Values::Sixteen(v) => f32::from(v[i]),
-            Values::Float(v) => v[i],
+            Samples::Eight(v) => f32::from(v[i]),
+            Samples::Sixteen(v) => f32::from(v[i]),
+            Samples::Float(v) => v[i],
         }
     }
 }
@@ -131,24 +102,7 @@ pub fn exif(path: &Path) -> Result<Exif, MeasureError> {
     if file.metadata().map_err(io)?.len() > MOST_BYTES {
         return Err(MeasureError::photo(path, format!("larger than {} MB", MOST_BYTES >> 20)));
     }
-    let Ok(fields) = exif::Reader::new().read_from_container(&mut BufReader::new(file)) else {
-        return Ok(Exif::default());
-    };
-    let number = |tag| {
-        let field = fields.get_field(tag, In::PRIMARY)?;
-        let value = match &field.value {
-            exif::Value::Rational(values) => values.first()?.to_f64(),
-            other => f64::from(other.get_uint(0)?),
-        };
-        Some(value).filter(|value| value.is_finite() && *value > 0.0)
-    };
-    Ok(Exif {
-        seconds: number(Tag::ExposureTime),
-        aperture: number(Tag::FNumber),
-        iso: number(Tag::PhotographicSensitivity),
-        film_focal_mm: number(Tag::FocalLengthIn35mmFilm),
-        orientation: number(Tag::Orientation).map(|value| value as u8),
-    })
+    Ok(readers::exif(BufReader::new(file)))
 }
 
 /// Reads a photograph, upright.
@@ -171,39 +125,27 @@ pub fn read(path: &Path) -> Result<Photo, MeasureError> {
 }
 
 fn decode(bytes: &[u8], path: &Path, turn: bool) -> Result<Photo, MeasureError> {
-    let wrong = |error: &dyn std::fmt::Display| {
+    let wrong = |fault: &readers::Fault| {
         MeasureError::photo(
             path,
-            format!("not a readable photograph ({error}); expected TIFF, PNG, OpenEXR or JPEG"),
+            format!("not a readable photograph ({fault}); expected TIFF, PNG, OpenEXR or JPEG"),
         )
     };
-    let format = image::guess_format(bytes).map_err(|e| wrong(&e))?;
     let bounds = Bounds { side: None, bytes: 16 * MOST_PIXELS };
-    let mut opened = readers::open(bytes, format, bounds).map_err(|e| wrong(&e))?;
-    let (width, height) = opened.size();
+    let opened = Format::of(bytes, path).and_then(|format| format.open(bytes, bounds));
+    let header = opened.map_err(|fault| wrong(&fault))?;
+    let (width, height) = header.size();
     if u64::from(width) * u64::from(height) > MOST_PIXELS {
         let problem = format!("{width} x {height} pixels; the limit is {} million", MOST_PIXELS / 1_000_000);
         return Err(MeasureError::photo(path, problem));
     }
-    let side = if turn { opened.orientation() } else { Orientation::NoTransforms };
-    let mut picture = opened.decode().map_err(|e| wrong(&e))?;
-    picture.apply_orientation(side);
-    let (width, height) = (picture.width() as usize, picture.height() as usize);
-    let values = match picture {
-        DynamicImage::ImageLuma8(_)
-        | DynamicImage::ImageLumaA8(_)
-        | DynamicImage::ImageRgb8(_)
-        | DynamicImage::ImageRgba8(_) => Values::Eight(picture.into_rgb8().into_raw()),
-        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
-            let values = picture.into_rgb32f().into_raw();
-            if values.iter().any(|value| !value.is_finite()) {
-                return Err(MeasureError::photo(path, "holds values that are no numbers; export it again"));
-            }
-            Values::Float(values)
-        }
-        _ => Values::Sixteen(picture.into_rgb16().into_raw()),
-    };
-    Ok(Photo { width, height, values })
+    let stored = header.decode().map_err(|fault| wrong(&fault))?;
+    let stored = if turn { stored.upright() } else { stored };
+    if stored.samples.not_finite().is_some() {
+        return Err(MeasureError::photo(path, "holds values that are no numbers; export it again"));
+    }
+    let (width, height) = (stored.width, stored.height);
+    Ok(Photo { width, height, values: stored.into_rgb() })
 }
 
 /// Runs the first of these programs that is installed on a RAW file.
@@ -275,7 +217,7 @@ mod tests {
             sixteen().save(&path).unwrap();
             let photo = read(&path).unwrap();
             assert_eq!((photo.width, photo.height), (5, 3));
-            assert!(matches!(photo.values, Values::Sixteen(_)), "{name}");
+            assert!(matches!(photo.values, Samples::Sixteen(_)), "{name}");
             assert_eq!([photo.at(3 * 7), photo.at(3 * 7 + 1)], [2001.0, 40_000.0], "{name}");
         }
         let path = folder.path().join("c.exr");
@@ -285,7 +227,7 @@ mod tests {
         let path = folder.path().join("d.jpg");
         ImageBuffer::from_pixel(8, 8, Rgb([200u8, 100, 50])).save(&path).unwrap();
         let photo = read(&path).unwrap();
-        assert!(matches!(photo.values, Values::Eight(_)) && (photo.at(1) - 100.0).abs() < 3.0);
+        assert!(matches!(photo.values, Samples::Eight(_)) && (photo.at(1) - 100.0).abs() < 3.0);
         std::fs::write(folder.path().join("notes.txt"), "no photograph").unwrap();
         assert_eq!(list(folder.path()).unwrap().len(), 4);
     }

@@ -4,8 +4,9 @@
 //! merged. Method: blocks of pixels become one, with their mean and their largest value; noise is the second difference
 //! along rows, which smooth shading does not enter. Cost: one pass over each photograph.
 
-use super::photo::{Photo, Values};
+use super::photo::Photo;
 use crate::linalg::median;
+use readers::Samples;
 
 /// Pixels across a small copy, at most.
 const ACROSS: usize = 640;
@@ -61,9 +62,9 @@ impl Probe {
             }
         }
         let limit = match raw.values {
-            Values::Eight(_) => 255.0,
-            Values::Sixteen(_) => 65_535.0,
-            Values::Float(_) => f32::INFINITY,
+            Samples::Eight(_) => 255.0,
+            Samples::Sixteen(_) => 65_535.0,
+            Samples::Float(_) => f32::INFINITY,
         };
         let stride = (photo.width * photo.height / NOISE_SAMPLES).max(1) | 1;
         let noise = (3..photo.width * photo.height - 3.min(photo.width * photo.height))
@@ -167,7 +168,7 @@ mod tests {
                     .map(|()| (v + normal(&mut state) * (gain * v + read).sqrt()).clamp(0.0, 50_000.0) as u16)
             })
             .collect();
-        Photo { width, height, values: Values::Sixteen(values) }
+        Photo { width, height, values: Samples::Sixteen(values) }
     }
 
     #[test]
@@ -186,7 +187,7 @@ mod tests {
     #[test]
     fn without_a_pile_the_limit_is_that_of_the_file() {
         let photo =
-            Photo { width: 4, height: 4, values: Values::Sixteen((0..48).map(|i| i * 900).collect()) };
+            Photo { width: 4, height: 4, values: Samples::Sixteen((0..48).map(|i| i * 900).collect()) };
         assert_eq!(white(&[probe(&photo)]), [65_535.0; 3]);
     }
 }

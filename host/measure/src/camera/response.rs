@@ -169,7 +169,8 @@ fn channel(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::photo::{Photo, Values};
+    use crate::camera::photo::Photo;
+    use readers::Samples;
 
     fn taken(curve: impl Fn(f64) -> f64, exposure: f64) -> Photo {
         let (width, height) = (256, 64);
@@ -179,7 +180,7 @@ mod tests {
                 [(curve((light * exposure).min(1.0)) * 255.0).round() as u8; 3]
             })
             .collect();
-        Photo { width, height, values: Values::Eight(values) }
+        Photo { width, height, values: Samples::Eight(values) }
     }
 
     fn probe(photo: &Photo) -> Probe {

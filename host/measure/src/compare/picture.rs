@@ -11,10 +11,11 @@ use rayon::prelude::*;
 use super::flat::{ComparedArea, Flat};
 use crate::MeasureError;
 use crate::camera::merge::Radiance;
-use crate::camera::photo::{self, Values};
+use crate::camera::photo;
 use crate::camera::probe::CLIPPED;
 use crate::geometry::grey::Grey;
 use crate::geometry::pose::{Lens, Pose};
+use readers::Samples;
 
 /// A photograph, linear in light.
 pub(crate) struct Picture {
@@ -33,17 +34,17 @@ pub(crate) struct Picture {
 impl Picture {
     pub(crate) fn read(path: &Path, linear: Option<bool>) -> Result<Picture, MeasureError> {
         let photo = photo::read(path)?;
-        let eight = matches!(photo.values, Values::Eight(_));
+        let eight = matches!(photo.values, Samples::Eight(_));
         let (limit, full) = match photo.values {
-            Values::Eight(_) => (255.0, 253.5 / 255.0),
-            Values::Sixteen(_) => (65_535.0, CLIPPED),
-            Values::Float(_) => (1.0, f32::INFINITY),
+            Samples::Eight(_) => (255.0, 253.5 / 255.0),
+            Samples::Sixteen(_) => (65_535.0, CLIPPED),
+            Samples::Float(_) => (1.0, f32::INFINITY),
         };
         let bent = !linear.unwrap_or(!eight);
         let plain = |v: f32| if bent { undone(v / limit) } else { v / limit };
         let count = 3 * photo.width * photo.height;
         let values: Vec<f32> = match &photo.values {
-            Values::Eight(bytes) => {
+            Samples::Eight(bytes) => {
                 let table: Vec<f32> = (0..=255).map(|v| plain(v as f32)).collect();
                 bytes.par_iter().map(|v| table[usize::from(*v)]).collect()
             }
@@ -54,7 +55,7 @@ impl Picture {
             let problem = format!("{} x {} pixels; too small to find marks in", photo.width, photo.height);
             return Err(MeasureError::photo(path, problem));
         }
-        let sixteen = matches!(photo.values, Values::Sixteen(_));
+        let sixteen = matches!(photo.values, Samples::Sixteen(_));
         Ok(Picture { width: photo.width, height: photo.height, values, full, bent, sixteen })
     }
 

@@ -10,11 +10,10 @@ use std::f64::consts::PI;
 
 use appearance::brdf::reflectances;
 use appearance::factor::Factored;
-use image::RgbImage;
-use image::codecs::jpeg::JpegEncoder;
 use inks::{Curve, Stack};
 use observe::Observer;
 use press::preview::{Radiance, Source, ToneCurve, picture as picture_of};
+use readers::Pixels;
 use sheet::Area;
 use view::{Light, Lit, Renderer, Scene};
 
@@ -348,25 +347,23 @@ fn radiance(flat: &Flat) -> Radiance {
     }
 }
 
-fn jpeg(picture: &RgbImage) -> Result<Vec<u8>, MeasureError> {
-    let mut bytes = Vec::new();
-    JpegEncoder::new_with_quality(&mut bytes, QUALITY).encode_image(picture).map_err(view_error)?;
-    Ok(bytes)
+fn jpeg(picture: &Pixels<[u8; 3]>) -> Result<Vec<u8>, MeasureError> {
+    picture.jpeg(QUALITY).map_err(view_error)
 }
 
 /// Red where the photograph is brighter than the print, blue where it is darker, white where they agree.
-fn difference(photo: &Flat, print: &Radiance, predicted: &Spots) -> RgbImage {
+fn difference(photo: &Flat, print: &Radiance, predicted: &Spots) -> Pixels<[u8; 3]> {
     let mean = predicted.iter().flatten().sum::<f64>() / (3 * predicted.len().max(1)) as f64;
-    RgbImage::from_fn(photo.width as u32, photo.height as u32, |x, y| {
+    Pixels::from_fn(photo.width as u32, photo.height as u32, |x, y| {
         let i = y as usize * photo.width + x as usize;
         if !photo.known[i] {
-            return image::Rgb([128, 128, 128]);
+            return [128, 128, 128];
         }
         let covered = print.pixels[i][3].max(1e-3);
         let off: f64 =
             (0..3).map(|c| f64::from(photo.rgb[i][c] - print.pixels[i][c] / covered)).sum::<f64>() / 3.0;
         let part = (off / (DIFFERENCE * mean.max(1e-12))).clamp(-1.0, 1.0);
         let fade = |away: f64| (255.0 * (1.0 - away.max(0.0))) as u8;
-        image::Rgb([fade(-part), fade(part.abs()), fade(part)])
+        [fade(-part), fade(part.abs()), fade(part)]
     })
 }

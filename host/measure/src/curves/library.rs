@@ -75,7 +75,7 @@ pub fn write(taken: &Taken, folder: &Path) -> Result<(), MeasureError> {
     save(inks::FILE_NAME, library.as_bytes())?;
     save(FIGURES, &serde_json::to_vec_pretty(measurement).map_err(|e| failed(FIGURES, &e))?)?;
     for (name, picture) in &taken.pictures {
-        picture.save_with_format(folder.join(name), image::ImageFormat::Png).map_err(|e| failed(name, &e))?;
+        save(name, &picture.png().map_err(|e| failed(name, &e))?)?;
     }
     Ok(())
 }

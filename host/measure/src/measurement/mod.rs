@@ -9,8 +9,8 @@ mod look;
 
 use std::path::Path;
 
-use image::RgbImage;
 use observe::Observer;
+use readers::Pixels;
 use serde::{Deserialize, Serialize};
 use sheet::DotMap;
 
@@ -104,7 +104,7 @@ pub struct Taken {
     /// The figures.
     pub measurement: Measurement,
     /// Masks and residuals, with their file names.
-    pub pictures: Vec<(String, RgbImage)>,
+    pub pictures: Vec<(String, Pixels<[u8; 3]>)>,
 }
 
 /// Measures the photographs of a folder. `chart` is the sheet of the chart that lies on the sample, if the setup names one. A stack that

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use readers::resolution::of_file;
+use readers::Format;
 
 use crate::MeasureError;
 
@@ -15,6 +15,6 @@ use crate::MeasureError;
 pub fn dpi(path: &Path) -> Result<Option<[f64; 2]>, MeasureError> {
     let bytes =
         std::fs::read(path).map_err(|source| MeasureError::Io { path: path.to_path_buf(), source })?;
-    let format = image::guess_format(&bytes).ok();
-    Ok(format.and_then(|format| of_file(&bytes, format)).map(|(across, down)| [across, down]))
+    let stated = Format::of(&bytes, path).ok().and_then(|format| format.resolution(&bytes));
+    Ok(stated.map(|(across, down)| [across, down]))
 }

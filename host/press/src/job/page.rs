@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use image::{ExtendedColorType, RgbImage};
+use readers::Pixels;
 
 use super::plan::{Plan, Suggestion, grouped, plural};
 use super::ribbon;
@@ -13,20 +13,17 @@ use crate::html::{self, escape};
 /// The pictures on the page: what the sheet will look like.
 pub struct Pictures {
     /// The whole sheet.
-    pub sheet: RgbImage,
+    pub sheet: Pixels<[u8; 3]>,
     /// The printed part of it in each pass, in the order of the plan's passes.
-    pub passes: Vec<RgbImage>,
+    pub passes: Vec<Pixels<[u8; 3]>>,
 }
 
 /// The plan with pictures of the sheet and of each pass, for a sheet of A4 or letter.
 ///
 /// # Errors
 /// When a picture cannot be compressed.
-pub fn html(plan: &Plan, pictures: &Pictures) -> Result<String, image::ImageError> {
-    let encoded = |picture: &RgbImage| {
-        let png = readers::png(picture, picture.dimensions(), ExtendedColorType::Rgb8)?;
-        Ok::<String, image::ImageError>(STANDARD.encode(png))
-    };
+pub fn html(plan: &Plan, pictures: &Pictures) -> std::io::Result<String> {
+    let encoded = |picture: &Pixels<[u8; 3]>| Ok::<_, std::io::Error>(STANDARD.encode(picture.png()?));
     let sheet = encoded(&pictures.sheet)?;
     let passes: Vec<String> = pictures.passes.iter().map(encoded).collect::<Result<_, _>>()?;
     let mut body = String::new();

@@ -7,8 +7,8 @@ use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
 use embedded_graphics::pixelcolor::{Rgb888, RgbColor};
 use embedded_graphics::prelude::{DrawTarget, Drawable, OriginDimensions, Pixel, Point, Size};
 use embedded_graphics::text::{Baseline, Text};
-use image::{Rgb, RgbImage};
 use rayon::prelude::*;
+use readers::Pixels;
 
 use super::error::{PreviewError, check_size};
 use super::radiance::Radiance;
@@ -51,22 +51,23 @@ impl Letters {
 
 /// A picture on the neutral background.
 pub(super) struct Canvas {
-    image: RgbImage,
+    image: Pixels<[u8; 3]>,
 }
 
 impl Canvas {
     pub fn new(width: usize, height: usize) -> Result<Canvas, PreviewError> {
         check_size(width, height)?;
-        Ok(Canvas { image: RgbImage::from_pixel(width as u32, height as u32, Rgb(GROUND)) })
+        Ok(Canvas { image: Pixels::filled(width as u32, height as u32, GROUND) })
     }
 
-    pub fn finish(self) -> RgbImage {
+    pub fn finish(self) -> Pixels<[u8; 3]> {
         self.image
     }
 
     /// Writes a line with its top left corner at (x, y), cut off at the edge. Letters outside Latin-1 become question marks.
     pub fn text(&mut self, x: usize, y: usize, letters: Letters, colour: [u8; 3], text: &str) {
-        let (width, height) = (self.image.width() as usize, self.image.height() as usize);
+        let (width, height) = self.image.size();
+        let (width, height) = (width as usize, height as usize);
         if x >= width || y >= height {
             return;
         }
@@ -80,10 +81,10 @@ impl Canvas {
     /// Draws radiance over the background with its top left corner at (x, y).
     pub fn paste(&mut self, x: usize, y: usize, picture: &Radiance, tone: ToneCurve) {
         let ground = linear(GROUND);
-        let (width, stride) = (picture.width.max(1), 3 * self.image.width() as usize);
-        let lines = self.image.par_chunks_exact_mut(stride.max(1)).skip(y);
+        let (width, stride) = (picture.width.max(1), self.image.size().0 as usize);
+        let lines = self.image.pixels_mut().par_chunks_exact_mut(stride.max(1)).skip(y);
         lines.zip(picture.pixels.par_chunks_exact(width)).for_each(|(line, row)| {
-            let visible = line.as_chunks_mut::<3>().0.iter_mut().skip(x);
+            let visible = line.iter_mut().skip(x);
             for (out, &[r, g, b, covered]) in visible.zip(row).filter(|(_, pixel)| pixel[3] > 0.0) {
                 // Tone mapping applies to the covered part; the result is then blended at the edge.
                 let shown = tone.shown([r, g, b].map(|v| v / covered));
@@ -96,7 +97,7 @@ impl Canvas {
 
 impl OriginDimensions for Canvas {
     fn size(&self) -> Size {
-        Size::new(self.image.width(), self.image.height())
+        Size::from(self.image.size())
     }
 }
 
@@ -107,10 +108,9 @@ impl DrawTarget for Canvas {
     fn draw_iter<I: IntoIterator<Item = Pixel<Rgb888>>>(&mut self, pixels: I) -> Result<(), Infallible> {
         for Pixel(at, colour) in pixels {
             if let (Ok(x), Ok(y)) = (u32::try_from(at.x), u32::try_from(at.y))
-                && x < self.image.width()
-                && y < self.image.height()
+                && let Some(pixel) = self.image.at_mut(x, y)
             {
-                self.image.put_pixel(x, y, Rgb([colour.r(), colour.g(), colour.b()]));
+                *pixel = [colour.r(), colour.g(), colour.b()];
             }
         }
         Ok(())
@@ -121,7 +121,7 @@ impl DrawTarget for Canvas {
 ///
 /// # Errors
 /// A side that is 0 or too long.
-pub fn picture(radiance: &Radiance, tone: ToneCurve) -> Result<RgbImage, PreviewError> {
+pub fn picture(radiance: &Radiance, tone: ToneCurve) -> Result<Pixels<[u8; 3]>, PreviewError> {
     let mut canvas = Canvas::new(radiance.width, radiance.height)?;
     canvas.paste(0, 0, radiance, tone);
     Ok(canvas.finish())
@@ -146,7 +146,7 @@ mod tests {
         canvas.text(1 << 40, 5, Letters::Title, INK, "far away");
         canvas.text(5, 1 << 40, Letters::Title, INK, "far below");
         let image = canvas.finish();
-        let lit = |x: u32, y: u32| image.get_pixel(x, y).0 != GROUND;
+        let lit = |x: u32, y: u32| image.at(x, y) != GROUND;
         let all = || (0..30).flat_map(|y| (0..40).map(move |x| (x, y)));
         assert!(all().filter(|&(x, y)| lit(x, y)).count() > 40);
         assert!(all().filter(|&(x, y)| lit(x, y)).all(|(x, y)| x >= 9 && (8..21).contains(&y)));
@@ -163,10 +163,10 @@ mod tests {
             ToneCurve { exposure: 1.0, ..ToneCurve::PAPER },
         );
         let image = canvas.finish();
-        let value = |x| linear(image.get_pixel(x, 0).0)[0];
+        let value = |x| linear(image.at(x, 0))[0];
         assert!((value(0) - 0.2).abs() < 2e-3);
         assert!((value(1) - 0.5 * (0.2 + linear(GROUND)[0])).abs() < 2e-3);
-        assert_eq!(image.get_pixel(2, 0).0, GROUND);
+        assert_eq!(image.at(2, 0), GROUND);
     }
 
     #[test]
@@ -175,8 +175,8 @@ mod tests {
         let picture = Radiance { width: 3, height: 3, pixels: vec![[9.0, 9.0, 9.0, 1.0]; 9] };
         canvas.paste(1, 1, &picture, ToneCurve { exposure: 1.0, ..ToneCurve::PAPER });
         let image = canvas.finish();
-        assert_eq!(image.get_pixel(0, 1).0, GROUND);
-        assert!(image.get_pixel(1, 1).0[0] > 240);
+        assert_eq!(image.at(0, 1), GROUND);
+        assert!(image.at(1, 1)[0] > 240);
     }
 
     #[test]

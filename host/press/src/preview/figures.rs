@@ -4,8 +4,8 @@
 //! light probe and one exposure, and [`SIX_LIGHTS`] are the lights of the row in which a document stands over its print
 //! ([`Panels`](super::Panels)).
 
-use image::RgbImage;
 use rayon::prelude::*;
+use readers::Pixels;
 
 use appearance::brdf::{Space, Table};
 use appearance::factor::Factored;
@@ -65,7 +65,7 @@ pub fn weights_picture(
     factored: &Factored,
     probe: &Probe,
     observer: &dyn Observer,
-) -> Result<RgbImage, PreviewError> {
+) -> Result<Pixels<[u8; 3]>, PreviewError> {
     let (balls, paper) = balls(&factored.space, &factored.bases, probe, observer)?;
     let source = Source::Factored(factored);
     let (width, height) = source.fit(SIDE);
@@ -100,7 +100,7 @@ pub fn balls_picture(
     columns: &[(&str, Table)],
     probe: &Probe,
     observer: &dyn Observer,
-) -> Result<RgbImage, PreviewError> {
+) -> Result<Pixels<[u8; 3]>, PreviewError> {
     let line = Letters::Plain.height() + 4;
     let rows = columns.iter().map(|(_, rows)| rows.len()).max().unwrap_or(0);
     let head = GAP + Letters::Title.height() + GAP;

@@ -8,12 +8,13 @@
 use std::path::Path;
 use std::str::FromStr;
 
-use image::RgbImage;
+use readers::Pixels;
+use readers::exact::Exact;
 
 use crate::separate::Pass;
 use files::FileError;
 use sheet::colours::{label, upon};
-use sheet::picture::{Kind, write_png};
+use sheet::picture::write_png;
 use sheet::{Area, Sheet};
 
 /// A background to print on, sRGB.
@@ -71,7 +72,7 @@ pub fn save_sheet(
     let rows = sheet.index().chunks_exact(sheet.width()).skip(area.top).take(area.length);
     let rows = rows.flat_map(|row| std::iter::repeat_n(row, across));
     let dots: Vec<u8> = rows.flat_map(|row| &row[area.left..][..area.width]).copied().collect();
-    write_png(path, (area.width, area.length * across), square(across), Kind::Indexed(&palette), &dots)
+    write_png(path, (area.width, area.length * across), square(across), Exact::Indexed(&palette), &dots)
 }
 
 /// Pixels per inch of a picture in the sheet's shape.
@@ -97,12 +98,12 @@ pub fn save_pass(
     let palette = [ground.0, label(pass.ink, ground.0)];
     let rows = pass.plane.rows_in(area).map(Iterator::collect::<Vec<u8>>);
     let bits: Vec<u8> = rows.flat_map(|row| row.repeat(across)).collect();
-    write_png(path, (area.width, area.length * across), square(across), Kind::Two(&palette), &bits)
+    write_png(path, (area.width, area.length * across), square(across), Exact::Two(&palette), &bits)
 }
 
 /// A picture of the whole sheet, which has `across` dots in 1/600 inch; at most `longest` pixels on its longer side. Each
 /// pixel is the mean of its dots.
-pub fn thumbnail(sheet: &Sheet, across: usize, ground: Ground, longest: usize) -> RgbImage {
+pub fn thumbnail(sheet: &Sheet, across: usize, ground: Ground, longest: usize) -> Pixels<[u8; 3]> {
     let palette: Vec<[u8; 3]> = sheet.stacks().iter().map(|stack| upon(stack, ground.0)).collect();
     let step = (sheet.width() / across).max(sheet.length()).div_ceil(longest.max(1)).max(1);
     let wide = step * across;
@@ -118,9 +119,9 @@ pub fn thumbnail(sheet: &Sheet, across: usize, ground: Ground, longest: usize) -
         }
     }
     // The sides of a sheet fit in u16, and a mean of bytes fits in a byte.
-    RgbImage::from_fn(width as u32, height as u32, |x, y| {
+    Pixels::from_fn(width as u32, height as u32, |x, y| {
         let [r, g, b, count] = sums[y as usize * width + x as usize];
-        image::Rgb([r, g, b].map(|sum| ((sum + count / 2) / count.max(1)) as u8))
+        [r, g, b].map(|sum| ((sum + count / 2) / count.max(1)) as u8)
     })
 }
 
@@ -129,7 +130,13 @@ pub fn thumbnail(sheet: &Sheet, across: usize, ground: Ground, longest: usize) -
 ///
 /// # Panics
 /// If the area leaves the plane, which is a bug of the caller.
-pub fn pass_thumbnail(pass: &Pass, area: Area, across: usize, ground: Ground, longest: usize) -> RgbImage {
+pub fn pass_thumbnail(
+    pass: &Pass,
+    area: Area,
+    across: usize,
+    ground: Ground,
+    longest: usize,
+) -> Pixels<[u8; 3]> {
     let colours = [ground.0, label(pass.ink, ground.0)];
     let step = (area.width / across).max(area.length).div_ceil(longest.max(1)).max(1);
     let wide = step * across;
@@ -152,13 +159,13 @@ pub fn pass_thumbnail(pass: &Pass, area: Area, across: usize, ground: Ground, lo
         }
     }
     // The sides of an area fit in u16, and a mean of bytes fits in a byte.
-    RgbImage::from_fn(width as u32, height as u32, |x, y| {
+    Pixels::from_fn(width as u32, height as u32, |x, y| {
         let [all, inked] = sums[y as usize * width + x as usize];
         let mean = |c: usize| {
             let sum = u32::from(colours[0][c]) * (all - inked) + u32::from(colours[1][c]) * inked;
             ((sum + all / 2) / all.max(1)) as u8
         };
-        image::Rgb([mean(0), mean(1), mean(2)])
+        [mean(0), mean(1), mean(2)]
     })
 }
 
@@ -222,12 +229,12 @@ mod tests {
         let pass = Pass { ink: Ink::White, plane: sheet::Plane { width: 20, length: 5, stride: 3, bits } };
         let area = Area { left: 4, top: 0, width: 12, length: 4 };
         let small = pass_thumbnail(&pass, area, 1, Ground([0; 3]), 6);
-        assert_eq!(small.dimensions(), (6, 2));
+        assert_eq!(small.size(), (6, 2));
         let white = f64::from(label(Ink::White, [0; 3])[0]);
         // Dots 4 and 5 of rows 0 and 1: one of four has ink.
         for (x, y, share) in [(0, 0, 0.25), (1, 0, 0.5), (2, 0, 0.25), (3, 0, 0.0), (1, 1, 0.5), (5, 1, 0.0)]
         {
-            let found = f64::from(small.get_pixel(x, y).0[0]);
+            let found = f64::from(small.at(x, y)[0]);
             assert!((found - share * white).abs() <= 1.0, "({x}, {y}): {found}");
         }
     }
@@ -235,9 +242,9 @@ mod tests {
     #[test]
     fn a_thumbnail_keeps_the_mean() {
         let small = thumbnail(&sheet(), 1, Ground([0; 3]), 10);
-        assert_eq!(small.dimensions(), (10, 6));
+        assert_eq!(small.size(), (10, 6));
         let white = f64::from(upon(&"W".parse().unwrap(), [0; 3])[0]);
         // Dots 4 and 5: half ground, half white.
-        assert!((f64::from(small.get_pixel(2, 0).0[0]) - white / 2.0).abs() <= 1.0);
+        assert!((f64::from(small.at(2, 0)[0]) - white / 2.0).abs() <= 1.0);
     }
 }

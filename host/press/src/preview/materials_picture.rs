@@ -4,9 +4,9 @@
 //! light probe. The card also states the distance of the metric and the mixture in words. All balls under one kind of light
 //! share the exposure of white paper under it, so that cards can be compared.
 
-use image::RgbImage;
 use inks::Stack;
 use rayon::prelude::*;
+use readers::Pixels;
 
 use appearance::brdf::{Space, Table};
 use observe::Observer;
@@ -49,7 +49,7 @@ pub fn materials_picture(
     probe: &Probe,
     ball: usize,
     observer: &dyn Observer,
-) -> Result<RgbImage, PreviewError> {
+) -> Result<Pixels<[u8; 3]>, PreviewError> {
     check_size(ball, ball)?;
     let mut rows = Table::new(space.columns());
     for row in swatches.iter().flat_map(|s| [s.target, s.printed]) {
@@ -189,8 +189,8 @@ mod tests {
         let mut lit = 0;
         for y in top..top + ball as u32 {
             for x in GAP as u32..(GAP + 2 * ball + 6) as u32 {
-                let left = picture.get_pixel(x, y);
-                assert_eq!(left, picture.get_pixel(x + shift, y), "({x}, {y})");
+                let left = picture.at(x, y);
+                assert_eq!(left, picture.at(x + shift, y), "({x}, {y})");
                 lit += u32::from(left.0[0] > 60);
             }
         }

@@ -12,9 +12,9 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use image::RgbImage;
 use observe::Observer;
 use rayon::prelude::*;
+use readers::Pixels;
 
 use super::canvas::{Canvas, INK, Letters, shortened};
 use super::error::PreviewError;
@@ -235,7 +235,11 @@ fn seen(board: &Board, elevation: f64, width: usize) -> Radiance {
 ///
 /// # Errors
 /// Those of [`mirrored`].
-pub fn near_picture(name: &str, source: &Source, observer: &dyn Observer) -> Result<RgbImage, PreviewError> {
+pub fn near_picture(
+    name: &str,
+    source: &Source,
+    observer: &dyn Observer,
+) -> Result<Pixels<[u8; 3]>, PreviewError> {
     let (across, down) = source.size();
     let board = Board::behind(down as f64 / across.max(1) as f64, ELEVATION);
     let sheet = mirrored(source, &board, ELEVATION, SIDE, observer)?;

@@ -9,8 +9,7 @@
 use std::f64::consts::PI;
 use std::path::Path;
 
-use image::ImageFormat;
-use readers::{Bounds, Opened};
+use readers::{Bounds, Format, Samples};
 
 use super::error::PreviewError;
 
@@ -20,8 +19,6 @@ const WIDEST: usize = 8192;
 const FEWEST: usize = 64;
 /// The most memory: that of the widest in four channels of four bytes.
 const BOUNDS: Bounds = Bounds { side: None, bytes: 512 << 20 };
-/// The first bytes of an OpenEXR file.
-const OPEN_EXR: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
 /// Radiance from every direction. See the module text for its layout.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,34 +75,38 @@ impl Probe {
     pub fn read(path: &Path) -> Result<Probe, PreviewError> {
         let wrong = |problem: String| PreviewError::Probe { path: path.to_path_buf(), problem };
         let bytes = std::fs::read(path).map_err(|e| wrong(e.to_string()))?;
-        Probe::from_bytes(&bytes).map_err(wrong)
+        Probe::from_bytes(&bytes, path).map_err(wrong)
     }
 
     /// Reads a panorama, or says what is wrong with it.
-    fn from_bytes(bytes: &[u8]) -> Result<Probe, String> {
-        if bytes.starts_with(&OPEN_EXR) {
-            let opened = readers::open(bytes, ImageFormat::OpenExr, BOUNDS).map_err(|e| e.to_string())?;
-            return Probe::decoded(opened, 1.0);
+    fn from_bytes(bytes: &[u8], path: &Path) -> Result<Probe, String> {
+        let expected = |found: &str| format!("expected a Radiance HDR or OpenEXR picture, {found}");
+        let format = Format::of(bytes, path).map_err(|fault| expected(&fault.to_string()))?;
+        if !["Radiance HDR", "OpenEXR"].contains(&format.name()) {
+            return Err(expected(&format!("found {}", format.name())));
         }
-        let (opened, exposure) = readers::open_radiance(bytes, BOUNDS).map_err(|e| e.to_string())?;
-        // The program that wrote the file multiplied the pixels by the exposure in the header.
-        if !(exposure.is_finite() && exposure > 0.0) {
-            return Err(format!("EXPOSURE={exposure} must be above 0"));
-        }
-        Probe::decoded(opened, exposure)
-    }
-
-    /// The panorama of a picture whose values were multiplied by `exposure`; or what is wrong with it.
-    fn decoded(opened: Opened<'_>, exposure: f32) -> Result<Probe, String> {
-        let (width, height) = opened.size();
-        let (width, height) = (width as usize, height as usize);
+        let header = format.open(bytes, BOUNDS).map_err(|fault| fault.to_string())?;
+        let (across, down) = header.size();
+        let (width, height) = (across as usize, down as usize);
         if width == 0 || height == 0 || width > WIDEST || width != 2 * height {
             return Err(format!(
                 "{width} x {height} pixels; it must be twice as wide as high and at most {WIDEST} wide"
             ));
         }
-        let image = opened.decode().map_err(|e| e.to_string())?.into_rgb32f();
-        let rgb: Vec<[f32; 3]> = image.pixels().map(|p| p.0.map(|v| v / exposure)).collect();
+        let stored = header.decode().map_err(|fault| fault.to_string())?;
+        let exposure = stored.exposure;
+        if !(exposure.is_finite() && exposure > 0.0) {
+            return Err(format!("EXPOSURE={exposure} must be above 0"));
+        }
+        let Samples::Float(values) = stored.into_rgb() else {
+            return Err(expected("found whole numbers"));
+        };
+        // The program that wrote the file multiplied the pixels by the exposure in the header.
+        let rgb: Vec<[f32; 3]> =
+            values.as_chunks::<3>().0.iter().map(|texel| texel.map(|v| v / exposure)).collect();
+        if rgb.len() != width * height {
+            return Err("its parts differ in size; save the panorama alone".into());
+        }
         if let Some(i) = rgb.iter().position(|texel| !texel.iter().all(lightens)) {
             return Err(format!(
                 "pixel ({}, {}) is {:?}; radiance must be a number and at least 0",

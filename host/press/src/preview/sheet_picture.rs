@@ -4,7 +4,7 @@
 //! they vary most. All panels of a column share one exposure, that of the target, so a difference between rows is a difference on
 //! paper; columns share it, too, unless [`Panels::each_exposed`] is asked for.
 
-use image::RgbImage;
+use readers::Pixels;
 
 use observe::Observer;
 use sheet::{Area, DotMap};
@@ -92,7 +92,7 @@ impl<'a> Panels<'a> {
     ///
     /// # Errors
     /// A picture larger than [`LONGEST_SIDE`](super::LONGEST_SIDE).
-    pub fn picture(&self, title: &str, notes: &[String]) -> Result<RgbImage, PreviewError> {
+    pub fn picture(&self, title: &str, notes: &[String]) -> Result<Pixels<[u8; 3]>, PreviewError> {
         let &Panels { lights, width, height, ref rows, each } = self;
         let target = &rows[0].1;
         let tones: Vec<ToneCurve> = (0..target.len())
@@ -209,8 +209,8 @@ mod tests {
         let mut seen = std::collections::BTreeSet::new();
         for y in first..first + 40 {
             for x in GAP as u32..picture.width() - GAP as u32 {
-                assert_eq!(picture.get_pixel(x, y), picture.get_pixel(x, y + step), "({x}, {y})");
-                seen.insert(picture.get_pixel(x, y).0);
+                assert_eq!(picture.at(x, y), picture.at(x, y + step), "({x}, {y})");
+                seen.insert(picture.at(x, y));
             }
         }
         assert!(seen.len() > 10, "only {} colours", seen.len());

@@ -11,8 +11,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{Pass, Separation};
 use files::{FileError, read_toml, write_toml};
+use readers::exact::{Exact, SIGNATURE};
 use sheet::files::{PaperText, check_format};
-use sheet::picture::{Kind, SIGNATURE, read_png, write_png};
+use sheet::picture::{read_png, write_png};
 use sheet::{MOST_PASSES, Plane};
 
 /// The text beside the pictures.
@@ -58,7 +59,7 @@ pub fn name(pass: usize, ink: Ink) -> String {
 /// Writes a plane of `dpi` dots per inch across and along as a one-bit picture, ink black.
 pub fn save_plane(plane: &Plane, dpi: (u16, u16), path: &Path) -> Result<(), FileError> {
     let bits: Vec<u8> = plane.bits.iter().map(|byte| !byte).collect();
-    write_png(path, (plane.width, plane.length), dpi, Kind::Bits, &bits)
+    write_png(path, (plane.width, plane.length), dpi, Exact::Bits, &bits)
 }
 
 /// Whether this program wrote a picture, as the picture says.
@@ -114,7 +115,7 @@ pub fn load(folder: &Path) -> Result<Saved, FileError> {
             let problem = format!("pass {number}, file: `{}`, expected `{}`", pass.file, name(i, ink));
             return Err(wrong(problem));
         }
-        let mut bits = read_png(&folder.join(&pass.file), (width, length), Kind::Bits)?;
+        let mut bits = read_png(&folder.join(&pass.file), (width, length), Exact::Bits)?;
         bits.iter_mut().for_each(|byte| *byte = !*byte);
         if width % 8 != 0 {
             let used = !(0xffu8 >> (width % 8));

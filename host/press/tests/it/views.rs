@@ -7,7 +7,6 @@ use appearance::document::Document;
 use appearance::factor::FactorSettings;
 use appearance::gamut::{GamutSettings, Printable};
 use appearance::views::{self, Pictures, ViewsError};
-use image::ExtendedColorType;
 use inks::{InkSet, Library};
 use observe::Silent;
 use press::layout::Layout;
@@ -36,7 +35,7 @@ fn write(path: &Path, (width, height): (usize, usize), drawing: Drawing) {
     let pixels = (0..width * height).map(|i| drawing(i % width, i / width));
     let bytes: Vec<u8> = pixels.map(|v| (255.0 * appearance::srgb::encode(v as f32)).round() as u8).collect();
     let size = (width as u32, height as u32);
-    std::fs::write(path, readers::png(&bytes, size, ExtendedColorType::L8).unwrap()).unwrap();
+    std::fs::write(path, readers::png(&bytes, size, readers::Kind::Grey).unwrap()).unwrap();
 }
 
 /// The document of two drawings for these inks.

@@ -2,7 +2,6 @@
 
 use anyhow::{Context, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
-use image::ImageFormat;
 use inks::{InkSet, Library, Stack};
 use protocol::ink::Ink;
 use serde_json::Value;
@@ -193,8 +192,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
                     let (staged, ramp) = (Staged::file(path)?, chart::ramp::parts().ramp);
                     let name = format!("{first} to {second}");
                     let picture = mirroring(&name, &dots, ramp, library, observer)?;
-                    picture
-                        .save_with_format(staged.path(), ImageFormat::Png)
+                    std::fs::write(staged.path(), picture.png()?)
                         .with_context(|| format!("cannot write {}", path.display()))?;
                     staged.commit()?;
                 }

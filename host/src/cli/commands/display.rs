@@ -12,6 +12,7 @@ use inks::{InkSet, Library, Stack};
 use press::layout::{Layout, Mm, Point};
 use press::preview::{Radiance, ToneCurve, picture};
 use rayon::prelude::*;
+use readers::Pixels;
 use serde_json::{Value, json};
 use view::direction;
 use view::display::{
@@ -313,12 +314,8 @@ impl Work<'_> {
                 folder.join(format!("{kind}-{number}.png"))
             };
             let path = name("mask");
-            frame
-                .picture(self.grid)
-                .save(&path)
-                .with_context(|| format!("cannot write {}", path.display()))?;
-            let path = name("seen");
-            self.seen(frame)?.save(&path).with_context(|| format!("cannot write {}", path.display()))?;
+            write(&path, &frame.picture(self.grid).png()?)?;
+            write(&name("seen"), &self.seen(frame)?.png()?)?;
             observer.advance(1);
             anyhow::Ok(())
         })?;
@@ -335,7 +332,7 @@ impl Work<'_> {
     }
 
     /// What is seen from straight ahead under both lights, side by side, by an eye that has adapted.
-    fn seen(&self, frame: &Frame) -> Result<image::RgbImage> {
+    fn seen(&self, frame: &Frame) -> Result<Pixels<[u8; 3]>> {
         let longest = self.grid.pixels().0.max(self.grid.pixels().1);
         let zoom = LEAST.div_ceil(longest);
         let panels = LIGHTS.map(|azimuth| {

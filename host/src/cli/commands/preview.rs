@@ -12,7 +12,6 @@ use std::path::{Path, PathBuf};
 use ::view::{Glb, Lit, Renderer, finer, glb, places_for_dot_gain, proportions};
 use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
-use image::{DynamicImage, ImageFormat, Rgba32FImage};
 use observe::Observer;
 use press::preview::{Probe, Radiance};
 use serde_json::json;
@@ -203,11 +202,10 @@ fn draw_figure(
     }
     let probe = probe.unwrap_or_else(|| Probe::studio(128));
     let picture = figure::figure(figure, &args.dots, &probe, observer)?;
-    picture
-        .save_with_format(staged.path(), ImageFormat::Png)
+    fs::write(staged.path(), picture.png()?)
         .with_context(|| format!("cannot write {}", args.output.display()))?;
     staged.commit()?;
-    let (width, height) = picture.dimensions();
+    let (width, height) = picture.size();
     let mut out = stdout();
     if args.json {
         let report = json!({ "written": args.output.display().to_string(), "pixels": [width, height] });
@@ -258,10 +256,7 @@ fn write_glb(args: &Args, glb: &Glb, shown: &PreviewSubject, staged: Staged) -> 
 
 /// Linear radiance with coverage as premultiplied alpha.
 fn write_exr(radiance: &Radiance, path: &Path) -> Result<()> {
-    let values = radiance.pixels.iter().flatten().copied().collect();
-    let (width, height) = (u32::try_from(radiance.width)?, u32::try_from(radiance.height)?);
-    let image = Rgba32FImage::from_raw(width, height, values).context("a picture has four values a pixel")?;
-    Ok(DynamicImage::ImageRgba32F(image).save_with_format(path, ImageFormat::OpenExr)?)
+    Ok(fs::write(path, readers::open_exr(&radiance.pixels, (radiance.width, radiance.height))?)?)
 }
 
 #[cfg(test)]

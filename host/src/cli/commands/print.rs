@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use clap::Args as ClapArgs;
-use image::RgbImage;
+use readers::Pixels;
 use serde_json::{Value, json};
 
 use crate::cli::arguments::choice::name;
@@ -131,8 +131,8 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     );
     let (made, pictures, (halftone, looked_at)) = (made?, seen.0?, seen.1?);
     let sheet = pictures.sheet(&prepared, made.job.draft.separation.passes.len())?;
-    let save = |name: &str, picture: &RgbImage| {
-        picture.save(made.folder.join(name)).with_context(|| format!("cannot write {name}"))
+    let save = |name: &str, picture: &Pixels<[u8; 3]>| {
+        std::fs::write(made.folder.join(name), picture.png()?).with_context(|| format!("cannot write {name}"))
     };
     let saved = rayon::join(|| save("sheet.png", &sheet), || save("materials.png", &pictures.materials));
     saved.0?;
@@ -167,7 +167,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
 struct Pictures {
     /// Document and print side by side.
     sheet: Panels<'static>,
-    materials: RgbImage,
+    materials: Pixels<[u8; 3]>,
     fidelity: preview::FidelityReport,
 }
 
@@ -209,7 +209,7 @@ impl Pictures {
     }
 
     /// Document and print side by side, with the number of passes below.
-    fn sheet(&self, prepared: &DocumentDots, passes: usize) -> Result<RgbImage> {
+    fn sheet(&self, prepared: &DocumentDots, passes: usize) -> Result<Pixels<[u8; 3]>> {
         let dots = &prepared.halftoned.dots;
         let (width, height) = (Mm::of_dots(dots.width() as i64).0, Mm::of_dots(dots.length() as i64).0);
         let notes = [

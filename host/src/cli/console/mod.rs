@@ -142,7 +142,7 @@ mod tests {
     }
 
     fn png() -> FileError {
-        FileError::Png { path: path(), source: png::DecodingError::IoError(disk()) }
+        FileError::Png { path: path(), source: disk() }
     }
 
     fn link() -> QueryError {
@@ -163,7 +163,7 @@ mod tests {
             (Box::new(DocumentError::Curve(CurveError::Io { path: path(), source: disk() })), fire()),
             (Box::new(FactorError::Weights(weights())), weights().to_string()),
             (Box::new(mixture()), MixtureError::NoStacks.to_string()),
-            (Box::new(MixFileError::Io { path: path(), attempt: "open", source: disk() }), fire()),
+            (Box::new(MixFileError::Io { path: path(), source: disk() }), fire()),
             (Box::new(MixFileError::Weights { path: path(), source: weights() }), weights().to_string()),
             (
                 Box::new(MixFileError::Mix { path: path(), source: MixError::Rows { rows: 2, channels: 3 } }),

@@ -1,9 +1,9 @@
 //! What the screen shows: a value for every cell, and the whole screen as a picture.
 
 use appearance::materials::Materials;
-use image::{GrayImage, Luma};
 use inks::Library;
 use rayon::prelude::*;
+use readers::Pixels;
 
 use super::grid::MARGIN;
 use super::{DisplayError, Grid, Solver};
@@ -82,16 +82,13 @@ impl Frame {
     }
 
     /// The whole screen.
-    pub fn picture(&self, grid: &Grid) -> GrayImage {
+    pub fn picture(&self, grid: &Grid) -> Pixels<u8> {
         let screen = grid.screen();
         let ((left, top), (across, down)) = (grid.origin(), grid.cells());
         let cell = |at: u32, first: u32| at.checked_sub(first).map(|at| (at / screen.cell) as usize);
-        GrayImage::from_fn(screen.pixels.0, screen.pixels.1, |x, y| {
-            let value = match (cell(x, left), cell(y, top)) {
-                (Some(x), Some(y)) if x < across && y < down => self.values[y * across + x],
-                _ => 0,
-            };
-            Luma([value])
+        Pixels::from_fn(screen.pixels.0, screen.pixels.1, |x, y| match (cell(x, left), cell(y, top)) {
+            (Some(x), Some(y)) if x < across && y < down => self.values[y * across + x],
+            _ => 0,
         })
     }
 }

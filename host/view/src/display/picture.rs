@@ -5,7 +5,7 @@ use std::path::Path;
 use appearance::brdf::Space;
 use appearance::materials::Materials;
 use appearance::srgb::decode;
-use readers::Bounds;
+use readers::{Bounds, Fault, Format};
 
 use super::DisplayError;
 
@@ -38,22 +38,23 @@ impl Matte {
     pub fn read(path: &Path, space: Space) -> Result<Matte, DisplayError> {
         let bad = |problem: String| DisplayError::Picture(format!("{}: {problem}", path.display()));
         let bytes = std::fs::read(path).map_err(|error| bad(format!("cannot be read: {error}")))?;
-        let decoded = || readers::open(&bytes, image::guess_format(&bytes)?, BOUNDS)?.decode();
-        let image = decoded().map_err(|error| match error {
-            image::ImageError::Limits(_) => {
+        let decoded = || Format::of(&bytes, path)?.open(&bytes, BOUNDS)?.decode();
+        let stored = decoded().map_err(|fault| match fault {
+            Fault::Large(_) => {
                 bad(format!("the picture is too large; at most {LONGEST} pixels a side and 1 GB are read"))
             }
-            error => bad(format!("expected a PNG, JPEG or TIFF picture: {error}")),
+            fault => bad(format!("expected a PNG, JPEG or TIFF picture: {fault}")),
         })?;
-        let image = image.into_rgba8();
-        let (width, height) = (image.width() as usize, image.height() as usize);
+        let (width, height, channels) = (stored.width, stored.height, stored.channels);
         let shade: Vec<f32> =
             (0..=255u8).map(|v| decode(f32::from(v) / 255.0) * std::f32::consts::FRAC_1_PI).collect();
-        let colour = |p: &image::Rgba<u8>| {
-            let [r, g, b, a] = p.0;
-            [r, g, b].map(|v| shade[usize::from(v)] * f32::from(a) / 255.0)
+        let colour = |pixel: &[u8]| {
+            let alpha = if channels.is_multiple_of(2) { pixel[channels - 1] } else { u8::MAX };
+            let rgb = if channels < 3 { [pixel[0]; 3] } else { [pixel[0], pixel[1], pixel[2]] };
+            rgb.map(|v| shade[usize::from(v)] * f32::from(alpha) / 255.0)
         };
-        Ok(Matte { width, height, space, rgb: image.pixels().map(colour).collect() })
+        let rgb = stored.samples.into_eight().chunks_exact(channels).map(colour).collect();
+        Ok(Matte { width, height, space, rgb })
     }
 }
 

@@ -159,7 +159,7 @@ fn beside_its_place_and_behind_glass_what_is_seen_is_the_mean_over_places() {
             let q = names.iter().position(|known| known == stack).expect("a stack of the grid");
             let passes = ways.map(|way| {
                 let pixel = |c: usize| ((at[c] + way[c]) / screen.pitch_mm).floor() as u32;
-                screen.passes(mask.get_pixel(left + pixel(0), top + pixel(1)).0[0])
+                screen.passes(mask.at(left + pixel(0), top + pixel(1)))
             });
             sums[q] += passes[0] * passes[1] / (SIDE * SIDE) as f64;
         }
@@ -182,7 +182,7 @@ fn the_alignment_frame_is_dark_only_in_line() {
         let mut paper = 0;
         for (y, x) in (0..down).flat_map(|y| (0..across).map(move |x| (y, x))) {
             let margin = x.min(across - 1 - x) < MARGIN || y.min(down - 1 - y) < MARGIN;
-            let open = mask.get_pixel(left + x as u32, top + y as u32).0[0] == 255;
+            let open = mask.at(left + x as u32, top + y as u32) == 255;
             let (x, y) = (x + dx as usize, y + dy as usize);
             if margin && open && x < across && y < down {
                 let dot = (grid.edge(y) + 2) * dots.width() + grid.edge(x) + 2;

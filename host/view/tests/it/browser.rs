@@ -6,7 +6,8 @@ use appearance::brdf::{Space, Table, reflectances};
 use appearance::edit::{Steps, apply, fingerprint};
 use appearance::factor::Factored;
 use appearance::weights::{ONE, WeightMaps};
-use image::{ImageFormat, RgbImage};
+use image::RgbImage;
+use readers::Pixels;
 use inks::{Curve, Library, Stack};
 use observe::Silent;
 use press::preview::{Probe, Source, ToneCurve, picture};
@@ -90,8 +91,7 @@ impl Made {
         let lit = Lit::new(&Source::Factored(&self.document), SIZE, 256).unwrap();
         let scene = scene(&[(-25.0, 30.0, 0.6)], (0.0, 0.0), 0.5, (0.0, 0.0), 0.0, None);
         let radiance = Renderer::new(&lit).render(&scene, 400, 300, &Silent).unwrap();
-        let mut still = std::io::Cursor::new(Vec::new());
-        picture(&radiance, ToneCurve::PAPER).unwrap().write_to(&mut still, ImageFormat::Png).unwrap();
+        let still = picture(&radiance, ToneCurve::PAPER).unwrap().png().unwrap();
         let mixtures: Vec<String> = (1..=3).map(|i| format!("mixture {i}")).collect();
         let subject = Subject {
             name: NAME,
@@ -108,7 +108,7 @@ impl Made {
             space: &self.space,
             probe,
             start: "show=document&with=printed&split=0.5&light=-25,30,0.6",
-            still: still.get_ref(),
+            still: &still,
         };
         let text = page(&subject, &Silent).unwrap();
         assert!(text.len() < 15_000_000);
@@ -154,6 +154,10 @@ impl std::fmt::Display for Apart {
         let Apart { mean, most, places, over } = self;
         write!(f, "mean {mean:.3}, most {most} and {over} over 4 at {places} places")
     }
+}
+
+fn decoded(picture: &Pixels<[u8; 3]>) -> RgbImage {
+    image::load_from_memory(&picture.png().unwrap()).unwrap().into_rgb8()
 }
 
 fn compared(ours: &RgbImage, page: &RgbImage) -> Apart {
@@ -271,7 +275,7 @@ fn the_page_draws_what_the_renderer_draws_in_a_browser() {
         let mut scene = scene(lights, view, distance, tilt, curl, surrounded.then_some(&probe));
         scene.camera = scene.camera.zoomed(zoom, [0.0; 2], &scene.pose).unwrap();
         let radiance = Renderer::new(lit).render(&scene, PICTURE.0, PICTURE.1, &Silent).unwrap();
-        let ours = picture(&radiance, ToneCurve { knee, ..ToneCurve::stops(stops) }).unwrap();
+        let ours = decoded(&picture(&radiance, ToneCurve { knee, ..ToneCurve::stops(stops) }).unwrap());
         let apart = compared(&ours, &shot(i));
         println!("{}: {apart}", fragments[i]);
         // Where single dots are drawn, most is edge. A border of dots that meets one of a pixel's sixteen places falls to either
@@ -297,7 +301,7 @@ fn the_page_draws_what_the_renderer_draws_in_a_browser() {
             let lit = Lit::new(&Source::Factored(document), SIZE, LONGEST).unwrap();
             let scene = scene(&[light], (0.0, 0.0), 0.5, (0.0, 0.0), 0.0, surrounded.then_some(&probe));
             let radiance = Renderer::new(&lit).render(&scene, PICTURE.0, PICTURE.1, &Silent).unwrap();
-            picture(&radiance, ToneCurve::stops(stops)).unwrap()
+            decoded(&picture(&radiance, ToneCurve::stops(stops)).unwrap())
         };
         let apart = compared(&drawn(&replayed), &shot(i));
         let change = compared(&drawn(&replayed), &drawn(&made.document)).mean;
@@ -330,11 +334,11 @@ fn the_page_draws_what_the_renderer_draws_in_a_browser() {
             vec![[f[0] as f32 * l[2] as f32, f[1] as f32 * l[2] as f32, f[2] as f32 * l[2] as f32, 1.0]];
         let expected =
             picture(&press::preview::Radiance { width: 1, height: 1, pixels }, ToneCurve::PAPER).unwrap();
-        let off = (0..3).map(|c| found.0[c].abs_diff(expected.get_pixel(0, 0).0[c])).max().unwrap();
+        let off = (0..3).map(|c| found.0[c].abs_diff(expected.at(0, 0)[c])).max().unwrap();
         if off > 2 {
             failed.push(format!(
                 "dot at ({x}, {y}), stack {stack}: {found:?}, not {:?}",
-                expected.get_pixel(0, 0)
+                expected.at(0, 0)
             ));
             break;
         }

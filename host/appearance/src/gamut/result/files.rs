@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 
 use inks::Stack;
 use rayon::prelude::*;
+use readers::exact::{self, Exact, Inexact};
 use serde::{Deserialize, Serialize};
 
 use super::mix::{InkMix, MixError};
@@ -120,19 +121,8 @@ pub fn save(mix: &InkMix, provenance: &Provenance, folder: &Path) -> Result<(), 
             bytes.extend_from_slice(&to_grey(weights[channel]).to_be_bytes());
         }
         let path = folder.join(map_name(channel));
-        let (Ok(width), Ok(height)) = (u32::try_from(maps.width()), u32::try_from(maps.height())) else {
-            let problem = "too large for a PNG".to_string();
-            return Err(MixFileError::Map { path, problem, width: maps.width(), height: maps.height() });
-        };
-        whole(&path, |file| {
-            let mut encoder = png::Encoder::new(file, width, height);
-            encoder.set_color(png::ColorType::Grayscale);
-            encoder.set_depth(png::BitDepth::Sixteen);
-            encoder.set_compression(png::Compression::Fast);
-            let mut writer = encoder.write_header().map_err(std::io::Error::other)?;
-            writer.write_image_data(&bytes).map_err(std::io::Error::other)?;
-            writer.finish().map_err(std::io::Error::other)
-        })
+        let size = (maps.width(), maps.height());
+        whole(&path, |file| exact::write(file, size, None, Exact::Deep, &bytes))
     })?;
     let description = Description {
         format: FORMAT.into(),
@@ -222,22 +212,10 @@ pub fn load(folder: &Path) -> Result<(InkMix, Provenance), MixFileError> {
 fn read_map(path: &Path, width: usize, height: usize) -> Result<Vec<u8>, MixFileError> {
     let wrong = |problem: String| MixFileError::Map { path: path.to_path_buf(), problem, width, height };
     let file = File::open(path).map_err(|source| MixFileError::Io { path: path.to_path_buf(), source })?;
-    let mut decoder = png::Decoder::new(BufReader::new(file));
-    decoder.set_transformations(png::Transformations::IDENTITY);
-    let mut reader = decoder.read_info().map_err(|e| wrong(e.to_string()))?;
-    let info = reader.info();
-    let found = (info.width as usize, info.height as usize);
-    if found != (width, height) {
-        return Err(wrong(format!("it has {} x {} pixels", found.0, found.1)));
-    }
-    if (info.color_type, info.bit_depth) != (png::ColorType::Grayscale, png::BitDepth::Sixteen) {
-        return Err(wrong(format!("its pixels are {:?} with {:?} bits", info.color_type, info.bit_depth)));
-    }
-    let mut bytes = vec![0; width * height * 2];
-    reader.next_frame(&mut bytes).map_err(|e| wrong(e.to_string()))?;
-    // Only this verifies the checksum of the last chunk.
-    reader.finish().map_err(|e| wrong(e.to_string()))?;
-    Ok(bytes)
+    exact::read(BufReader::new(file), (width, height), Exact::Deep).map_err(|error| match error {
+        Inexact::Damaged(said) => wrong(said.to_string()),
+        Inexact::Other { found, .. } => wrong(format!("it has {found}")),
+    })
 }
 
 fn map_name(channel: usize) -> String {

@@ -8,11 +8,11 @@ use appearance::document::SAMPLES;
 use appearance::factor::Factored;
 use appearance::gamut::{self, GamutSettings, Gloss, Intent, Mapped, Printable};
 use clap::ValueEnum;
-use image::RgbImage;
 use inks::Library;
 use observe::Observer;
 use press::preview::figures::{SIX_LIGHTS, balls_picture, bases_alone, weights_picture};
 use press::preview::{Panels, Probe, Source, near_picture};
+use readers::Pixels;
 use sheet::{Area, DotMap};
 
 use super::subject::{printed, printed_name};
@@ -32,7 +32,12 @@ pub enum Figure {
 }
 
 /// Draws a figure of a document.
-pub fn figure(figure: Figure, work: &DotsArgs, probe: &Probe, observer: &dyn Observer) -> Result<RgbImage> {
+pub fn figure(
+    figure: Figure,
+    work: &DotsArgs,
+    probe: &Probe,
+    observer: &dyn Observer,
+) -> Result<Pixels<[u8; 3]>> {
     if figure == Figure::Near {
         return near(work, observer);
     }
@@ -74,7 +79,7 @@ pub fn figure(figure: Figure, work: &DotsArgs, probe: &Probe, observer: &dyn Obs
 }
 
 /// What a print mirrors: of a document, a job or a sheet.
-fn near(work: &DotsArgs, observer: &dyn Observer) -> Result<RgbImage> {
+fn near(work: &DotsArgs, observer: &dyn Observer) -> Result<Pixels<[u8; 3]>> {
     let path = work.document.path();
     if let Some(dots) = printed(path, observer)? {
         return mirroring(&printed_name(path), &dots, inked(&dots), &work.inks.library()?, observer);
@@ -91,7 +96,7 @@ pub fn mirroring(
     area: Area,
     library: &Library,
     observer: &dyn Observer,
-) -> Result<RgbImage> {
+) -> Result<Pixels<[u8; 3]>> {
     let space = Space::half_angle(SAMPLES);
     let stacks = reflectances(dots.stacks(), library, &space);
     let print = Source::Print { dots, space: &space, stacks: &stacks, area };

@@ -13,7 +13,6 @@ use appearance::brdf::{Space, Table, reflectances};
 use appearance::document::{SAMPLES, name_of};
 use appearance::factor::{Factored, Method};
 use appearance::gamut::InkMix;
-use image::ExtendedColorType;
 use inks::Library;
 use observe::Observer;
 use press::layout::{Mm, Repeat};
@@ -269,8 +268,7 @@ pub fn printed_name(path: &Path) -> String {
 
 /// A picture as PNG.
 pub fn png(radiance: &Radiance, tone: ToneCurve) -> Result<Vec<u8>> {
-    let picture = picture(radiance, tone)?;
-    Ok(readers::png(&picture, picture.dimensions(), ExtendedColorType::Rgb8)?)
+    Ok(picture(radiance, tone)?.png()?)
 }
 
 #[cfg(test)]
