@@ -8,13 +8,9 @@
 //! Source: glTF 2.0, sections 3.9 and appendix B.
 
 mod loader;
+mod root;
 
 use std::path::Path;
-
-use ::gltf::json;
-use ::gltf::json::extensions::texture::TextureTransform;
-use ::gltf::json::material::AlphaMode;
-use ::gltf::json::validation::Checked;
 
 use super::content::{ColourSpace, Content, Document, Options, SWATCH_MM, name_of};
 use super::error::DocumentError;
@@ -27,10 +23,11 @@ use crate::brdf::Space;
 use crate::materials::dielectric;
 
 use loader::{Loaded, Loader, Placement, coloured};
+use root::{Clearcoat, Info, Material, Primitive, Root};
 
 /// Extensions that are supported, or that do not affect reflectance.
 const READ: [&str; 6] = [
-    CLEARCOAT,
+    "KHR_materials_clearcoat",
     "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_specular",
     "KHR_materials_ior",
@@ -38,9 +35,7 @@ const READ: [&str; 6] = [
     UNLIT,
 ];
 
-const CLEARCOAT: &str = "KHR_materials_clearcoat";
 const UNLIT: &str = "KHR_materials_unlit";
-const TRANSFORM: &str = "KHR_texture_transform";
 
 pub(super) fn open(
     path: &Path,
@@ -54,11 +49,8 @@ pub(super) fn open(
         field: field.into(),
         problem,
     };
-    check_glb(&bytes).map_err(|problem| wrong("GLB header", problem))?;
-    let ::gltf::Gltf { document, blob } = ::gltf::Gltf::from_slice_without_validation(&bytes)
-        .map_err(|error| wrong("glTF", error.to_string()))?;
-    drop(bytes);
-    let root = document.into_json();
+    let (text, blob) = root::chunks(&bytes).map_err(|problem| wrong("GLB header", problem))?;
+    let root = root::parse(text).map_err(|(field, problem)| wrong(&field, problem))?;
     let (number, material) = choose(&root, path, options.material.as_deref())?;
     let foreign: Vec<&str> = root
         .extensions_used
@@ -69,8 +61,8 @@ pub(super) fn open(
     if !foreign.is_empty() {
         source.note(format!("{}: the file uses {}, which is ignored", path.display(), foreign.join(", ")));
     }
-    let emits = material.emissive_texture.is_some() || material.emissive_factor.0 != [0.0; 3];
-    let is_transparent = material.alpha_mode != Checked::Valid(AlphaMode::Opaque);
+    let emits = material.emissive_texture.is_some() || material.emissive_factor != [0.0; 3];
+    let is_transparent = material.alpha_mode.as_deref().is_some_and(|mode| mode != "OPAQUE");
     let unprinted: Vec<&str> = [(emits, "emission"), (is_transparent, "transparency (alphaMode)")]
         .into_iter()
         .filter_map(|(is_there, what)| is_there.then_some(what))
@@ -82,11 +74,9 @@ pub(super) fn open(
             unprinted.join(", ")
         ));
     }
-    let coloured = |primitive: &json::mesh::Primitive| {
-        let colour = |semantic: &Checked<json::mesh::Semantic>| {
-            matches!(semantic, Checked::Valid(json::mesh::Semantic::Colors(_)))
-        };
-        primitive.material.is_some_and(|of| of.value() == number) && primitive.attributes.keys().any(colour)
+    let coloured = |primitive: &Primitive| {
+        let colour = |name: &String| name.starts_with("COLOR_");
+        primitive.material == Some(number) && primitive.attributes.keys().any(colour)
     };
     if root.meshes.iter().flat_map(|mesh| &mesh.primitives).any(coloured) {
         source.note(format!(
@@ -112,26 +102,12 @@ pub(super) fn open(
     })
 }
 
-/// Checks the lengths in the container, before the `gltf` crate does arithmetic on them.
-fn check_glb(bytes: &[u8]) -> Result<(), String> {
-    if !bytes.starts_with(b"glTF") {
-        return Ok(());
-    }
-    let Some(length) = bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])) else {
-        return Err(format!("expected 12 bytes, found {}", bytes.len()));
-    };
-    if length < 20 || length as usize > bytes.len() {
-        return Err(format!("it gives a length of {length} bytes, but the file has {}", bytes.len()));
-    }
-    Ok(())
-}
-
 /// The requested material, by number or name; by default the only one.
 fn choose<'r>(
-    root: &'r json::Root,
+    root: &'r Root,
     path: &Path,
     asked: Option<&str>,
-) -> Result<(usize, &'r json::Material), DocumentError> {
+) -> Result<(usize, &'r Material), DocumentError> {
     let name = |i: usize| root.materials[i].name.as_deref().unwrap_or("without a name");
     let fail = |problem: String| DocumentError::Choice {
         path: path.to_path_buf(),
@@ -165,10 +141,10 @@ fn choose<'r>(
     Ok((found, &root.materials[found]))
 }
 
-fn count_maps(material: &json::Material) -> u64 {
+fn count_maps(material: &Material) -> u64 {
     let pbr = &material.pbr_metallic_roughness;
     let mut maps = u64::from(material.normal_texture.is_some());
-    match material.extensions.as_ref().and_then(|e| e.pbr_specular_glossiness.as_ref()) {
+    match &material.extensions.glossiness {
         Some(old) => {
             maps += u64::from(old.diffuse_texture.is_some());
             maps += u64::from(old.specular_glossiness_texture.is_some());
@@ -183,41 +159,41 @@ fn count_maps(material: &json::Material) -> u64 {
 
 fn layers(
     loader: &mut Loader<'_, '_>,
-    material: &json::Material,
+    material: &Material,
     options: &Options,
 ) -> Result<Layers, DocumentError> {
     let space = options.colour_space.unwrap_or(ColourSpace::Srgb);
-    let extensions = material.extensions.as_ref();
-    let (base, kind) = match extensions.and_then(|e| e.pbr_specular_glossiness.as_ref()) {
+    let extensions = &material.extensions;
+    let (base, kind) = match &extensions.glossiness {
         Some(old) => {
-            note_clamped(loader, "diffuseFactor", &old.diffuse_factor.0);
-            note_clamped(loader, "specularFactor", &old.specular_factor.0);
-            note_clamped(loader, "glossinessFactor", &[old.glossiness_factor.0]);
-            let [r, g, b, _] = old.diffuse_factor.0;
+            note_clamped(loader, "diffuseFactor", &old.diffuse_factor);
+            note_clamped(loader, "specularFactor", &old.specular_factor);
+            note_clamped(loader, "glossinessFactor", &[old.glossiness_factor]);
+            let [r, g, b, _] = old.diffuse_factor;
             let base = loader.colour(old.diffuse_texture.as_ref(), [r, g, b], space, "diffuseTexture")?;
             let (f0, gloss) = match &old.specular_glossiness_texture {
                 Some(info) => {
                     let Loaded { name, picture } =
                         loader.load(info, "specularGlossinessTexture", Picture::decode_with_alpha)?;
                     loader.source.note(format!("{name}: alpha is read as glossiness"));
-                    let gloss = Field::Map(picture.channel(3)).times(old.glossiness_factor.0);
-                    (coloured(&picture, old.specular_factor.0, space), gloss)
+                    let gloss = Field::Map(picture.channel(3)).times(old.glossiness_factor);
+                    (coloured(&picture, old.specular_factor, space), gloss)
                 }
                 None => {
-                    (old.specular_factor.0.map(Field::Constant), Field::Constant(old.glossiness_factor.0))
+                    (old.specular_factor.map(Field::Constant), Field::Constant(old.glossiness_factor))
                 }
             };
             (base, PbrWorkflow::Specular { f0, gloss })
         }
         None => {
             let pbr = &material.pbr_metallic_roughness;
-            note_clamped(loader, "baseColorFactor", &pbr.base_color_factor.0);
-            note_clamped(loader, "roughnessFactor", &[pbr.roughness_factor.0]);
-            note_clamped(loader, "metallicFactor", &[pbr.metallic_factor.0]);
-            let [r, g, b, _] = pbr.base_color_factor.0;
+            note_clamped(loader, "baseColorFactor", &pbr.base_color_factor);
+            note_clamped(loader, "roughnessFactor", &[pbr.roughness_factor]);
+            note_clamped(loader, "metallicFactor", &[pbr.metallic_factor]);
+            let [r, g, b, _] = pbr.base_color_factor;
             let base =
                 loader.colour(pbr.base_color_texture.as_ref(), [r, g, b], space, "baseColorTexture")?;
-            let (rough, metal) = (pbr.roughness_factor.0, pbr.metallic_factor.0);
+            let (rough, metal) = (pbr.roughness_factor, pbr.metallic_factor);
             let (roughness, metal) = match &pbr.metallic_roughness_texture {
                 Some(info) => {
                     let Loaded { name, picture } =
@@ -232,11 +208,11 @@ fn layers(
                 }
                 None => (Field::Constant(rough), Field::Constant(metal)),
             };
-            let index = extensions.and_then(|e| e.ior.as_ref()).map_or(1.5, |ior| ior.ior.0);
+            let index = extensions.ior.as_ref().map_or(1.5, |ior| ior.ior);
             let plain = dielectric(index);
-            let (f0, level) = match extensions.and_then(|e| e.specular.as_ref()) {
+            let (f0, level) = match &extensions.specular {
                 Some(s) => {
-                    let tint = s.specular_color_factor.0.map(|v| v * plain);
+                    let tint = s.specular_color_factor.map(|v| v * plain);
                     let f0 = loader.colour(
                         s.specular_color_texture.as_ref(),
                         tint,
@@ -250,9 +226,9 @@ fn layers(
                             loader
                                 .source
                                 .note(format!("{name}: alpha is read as the strength of reflection"));
-                            Field::Map(picture.channel(3)).times(s.specular_factor.0)
+                            Field::Map(picture.channel(3)).times(s.specular_factor)
                         }
-                        None => Field::Constant(s.specular_factor.0),
+                        None => Field::Constant(s.specular_factor),
                     };
                     (f0, level)
                 }
@@ -261,7 +237,7 @@ fn layers(
             (base, PbrWorkflow::Metallic { roughness, metal, f0, level })
         }
     };
-    let unlit = extensions.is_some_and(|e| e.others.contains_key(UNLIT));
+    let unlit = extensions.unlit.is_some();
     let kind = if unlit {
         loader
             .source
@@ -275,43 +251,15 @@ fn layers(
         Some(normal) if !unlit => normal_variance(loader, normal, base[0].size())?,
         _ => None,
     };
-    let coat = match extensions.and_then(|e| e.others.get(CLEARCOAT)) {
+    let coat = match &extensions.clearcoat {
         Some(coat) if !unlit => clearcoat(loader, coat)?,
         _ => None,
     };
     Ok(Layers { base, kind, variance, coat })
 }
 
-/// `KHR_materials_clearcoat`, which the `gltf` crate does not know.
-#[derive(serde::Deserialize)]
-#[serde(rename_all = "camelCase", default)]
-struct Clearcoat {
-    clearcoat_factor: f32,
-    clearcoat_texture: Option<json::texture::Info>,
-    clearcoat_roughness_factor: f32,
-    clearcoat_roughness_texture: Option<json::texture::Info>,
-    clearcoat_normal_texture: Option<json::material::NormalTexture>,
-}
-
-impl Default for Clearcoat {
-    fn default() -> Clearcoat {
-        Clearcoat {
-            clearcoat_factor: 0.0,
-            clearcoat_texture: None,
-            clearcoat_roughness_factor: 0.0,
-            clearcoat_roughness_texture: None,
-            clearcoat_normal_texture: None,
-        }
-    }
-}
-
 /// How much the clear coat covers (red), and its roughness (green).
-fn clearcoat(
-    loader: &mut Loader<'_, '_>,
-    value: &serde_json::Value,
-) -> Result<Option<CoatLayer>, DocumentError> {
-    let coat: Clearcoat =
-        serde_json::from_value(value.clone()).map_err(|error| loader.wrong(CLEARCOAT, error.to_string()))?;
+fn clearcoat(loader: &mut Loader<'_, '_>, coat: &Clearcoat) -> Result<Option<CoatLayer>, DocumentError> {
     note_clamped(loader, "clearcoatFactor", &[coat.clearcoat_factor]);
     note_clamped(loader, "clearcoatRoughnessFactor", &[coat.clearcoat_roughness_factor]);
     if coat.clearcoat_factor <= 0.0 {
@@ -320,7 +268,7 @@ fn clearcoat(
     if coat.clearcoat_normal_texture.is_some() {
         loader.source.note("clearcoatNormalTexture: ignored; the coat is printed smooth".into());
     }
-    let mut field = |info: &Option<json::texture::Info>, factor, channel, name| match info {
+    let mut field = |info: &Option<Info>, factor, channel, name| match info {
         Some(info) => Ok::<_, DocumentError>(
             Field::Map(loader.load(info, name, Picture::decode)?.picture.channel(channel)).times(factor),
         ),
@@ -347,15 +295,10 @@ fn note_clamped(loader: &mut Loader<'_, '_>, name: &str, factors: &[f32]) {
 /// scale does.
 fn normal_variance(
     loader: &mut Loader<'_, '_>,
-    normal: &json::material::NormalTexture,
+    normal: &Info,
     base: Option<(usize, usize)>,
 ) -> Result<Option<Field>, DocumentError> {
-    let transform = normal.extensions.as_ref().and_then(|e| e.others.get(TRANSFORM)).cloned();
-    let transform: Option<TextureTransform> = transform
-        .map(serde_json::from_value)
-        .transpose()
-        .map_err(|error| loader.wrong("normalTexture", format!("{TRANSFORM}: {error}")))?;
-    let placement = Placement::new(normal.tex_coord, transform.as_ref());
+    let placement = Placement::of(normal);
     if loader.placement.is_some_and(|first| first != placement) {
         loader.source.note(
             "normalTexture: ignored, because its placement on the surface differs from that of the other maps"
@@ -363,7 +306,7 @@ fn normal_variance(
         );
         return Ok(None);
     }
-    let Loaded { name, picture } = loader.texture(normal.index.value(), "normalTexture", Picture::decode)?;
+    let Loaded { name, picture } = loader.texture(normal.index, "normalTexture", Picture::decode)?;
     if picture.colours() != 3 {
         return Err(loader
             .wrong("normalTexture", format!("{name}: expected normals with three components, found grey")));

@@ -4,11 +4,10 @@
 
 use std::path::{Path, PathBuf};
 
-use ::gltf::json;
-use ::gltf::json::extensions::texture::TextureTransform;
 use base64::Engine;
 use percent_encoding::percent_decode_str;
 
+use super::root::{Info, Root};
 use crate::document::content::ColourSpace;
 use crate::document::error::DocumentError;
 use crate::document::picture::Picture;
@@ -25,12 +24,13 @@ pub(super) struct Placement {
 }
 
 impl Placement {
-    pub(super) fn new(coordinates: u32, transform: Option<&TextureTransform>) -> Placement {
+    pub(super) fn of(info: &Info) -> Placement {
+        let transform = info.extensions.transform.as_ref();
         Placement {
-            offset: transform.map_or([0.0; 2], |t| t.offset.0),
-            rotation: transform.map_or(0.0, |t| t.rotation.0),
-            scale: transform.map_or([1.0; 2], |t| t.scale.0),
-            coordinates: transform.and_then(|t| t.tex_coord).unwrap_or(coordinates),
+            offset: transform.map_or([0.0; 2], |t| t.offset),
+            rotation: transform.map_or(0.0, |t| t.rotation),
+            scale: transform.map_or([1.0; 2], |t| t.scale),
+            coordinates: transform.and_then(|t| t.tex_coord).unwrap_or(info.tex_coord),
         }
     }
 
@@ -49,8 +49,8 @@ pub(super) struct Loaded {
 }
 
 pub(super) struct Loader<'a, 's> {
-    pub(super) root: &'a json::Root,
-    pub(super) blob: Option<Vec<u8>>,
+    pub(super) root: &'a Root,
+    pub(super) blob: Option<&'a [u8]>,
     pub(super) path: &'a Path,
     pub(super) source: &'a mut Source<'s>,
     /// The placement of the first map read; the others must share it.
@@ -65,12 +65,11 @@ impl<'a> Loader<'a, '_> {
     /// The image of a map that must align with the others.
     pub(super) fn load(
         &mut self,
-        info: &json::texture::Info,
+        info: &Info,
         field: &str,
         decode: Decode,
     ) -> Result<Loaded, DocumentError> {
-        let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
-        let placement = Placement::new(info.tex_coord, transform);
+        let placement = Placement::of(info);
         match self.placement {
             None => {
                 if !placement.is_plain() {
@@ -90,7 +89,7 @@ impl<'a> Loader<'a, '_> {
             }
             Some(_) => {}
         }
-        self.texture(info.index.value(), field, decode)
+        self.texture(info.index, field, decode)
     }
 
     pub(super) fn texture(
@@ -103,11 +102,9 @@ impl<'a> Loader<'a, '_> {
             return Err(self.wrong(field, format!("texture {index} does not exist")));
         };
         // WebP pictures come first: the other image is for those who cannot read them, and may be absent.
-        let webp = texture.extensions.as_ref().and_then(|e| e.others.get("EXT_texture_webp"));
-        let webp = webp.and_then(|webp| usize::try_from(webp.get("source")?.as_u64()?).ok());
-        let number = webp.unwrap_or(texture.source.value());
-        // What the parser puts where there is no number. Texture extensions name another image then, of a kind that is not read.
-        if number == u32::MAX as usize {
+        let webp = texture.extensions.webp.as_ref().and_then(|webp| webp.source);
+        // Where neither is, texture extensions name another image, of a kind that is not read.
+        let Some(number) = webp.or(texture.source) else {
             let kinds: Vec<&str> = self
                 .root
                 .extensions_used
@@ -124,7 +121,7 @@ impl<'a> Loader<'a, '_> {
                 "texture {index} has no image that can be read{other}; export the file with PNG or JPEG textures"
             );
             return Err(self.wrong(field, problem));
-        }
+        };
         let Some(image) = self.root.images.get(number) else {
             return Err(self.wrong(field, format!("image {number} does not exist")));
         };
@@ -132,7 +129,7 @@ impl<'a> Loader<'a, '_> {
             (Some(uri), _) => self.resource(uri, field, &format!("image {number}"))?,
             (None, Some(view)) => {
                 let name = PathBuf::from(format!("{} image {number}", self.path.display()));
-                (name, self.view(view.value(), field)?)
+                (name, self.view(view, field)?)
             }
             (None, None) => {
                 return Err(self.wrong(field, format!("image {number} has neither uri nor bufferView")));
@@ -149,7 +146,7 @@ impl<'a> Loader<'a, '_> {
         let Some(view) = self.root.buffer_views.get(index) else {
             return Err(self.wrong(field, format!("bufferView {index} does not exist")));
         };
-        let number = view.buffer.value();
+        let number = view.buffer;
         let Some(buffer) = self.root.buffers.get(number) else {
             return Err(self.wrong(field, format!("buffer {number} does not exist")));
         };
@@ -159,7 +156,7 @@ impl<'a> Loader<'a, '_> {
                 external = self.resource(uri, field, &format!("buffer {number}"))?.1;
                 &external
             }
-            None => match &self.blob {
+            None => match self.blob {
                 Some(blob) if number == 0 => blob,
                 _ => {
                     return Err(self.wrong(
@@ -169,12 +166,12 @@ impl<'a> Loader<'a, '_> {
                 }
             },
         };
-        let start = view.byte_offset.map_or(0, |offset| offset.0);
-        let end = start.checked_add(view.byte_length.0).filter(|&end| end <= data.len() as u64);
+        let start = view.byte_offset;
+        let end = start.checked_add(view.byte_length).filter(|&end| end <= data.len() as u64);
         let Some(end) = end else {
             let problem = format!(
                 "bufferView {index} covers {} bytes from {start}, but buffer {number} has {} bytes",
-                view.byte_length.0,
+                view.byte_length,
                 data.len()
             );
             return Err(self.wrong(field, problem));
@@ -207,7 +204,7 @@ impl<'a> Loader<'a, '_> {
 
     pub(super) fn colour(
         &mut self,
-        info: Option<&json::texture::Info>,
+        info: Option<&Info>,
         factor: [f32; 3],
         space: ColourSpace,
         field: &str,
