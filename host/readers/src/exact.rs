@@ -1,8 +1,9 @@
 //! PNG files that are data: dots of a sheet, bits of a pass, weights.
 //!
 //! Problem: they must come back bit by bit.
-//! Method: nothing is converted on the way. A file with another size, depth or kind than expected is refused, before anything is
-//! decoded. Cost: the file is written fast rather than small. Limits: grey of one or 16 bits, one or eight bits of a palette.
+//! Method: nothing is converted on the way. A file with another size, depth or kind than expected is refused,
+//! before anything is decoded. Cost: the file is written fast rather than small. Limits: grey of one or 16
+//! bits, one or eight bits of a palette.
 
 use std::io::{self, BufRead, Seek, Write};
 
@@ -103,7 +104,8 @@ pub enum Inexact {
     },
 }
 
-/// Reads a picture that must be of this size and kind; for an indexed one the colours may differ, not their number.
+/// Reads a picture that must be of this size and kind; for an indexed one the colours may differ, not their
+/// number.
 ///
 /// # Errors
 /// Another picture, or a damaged one.

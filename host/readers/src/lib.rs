@@ -1,10 +1,12 @@
 //! Pictures in files: decoding within limits, encoding, and what a file states of its picture.
 //!
-//! Problem: documents, flat art, light probes, photographs and pictures for screens come in the same formats. Each caller would
-//! judge them anew, and compile the decoders again.
-//! Method: decoders read bytes in memory and are compiled here. A file is opened first ([`open`]), which tells its size, so that the
-//! caller's own limits come before anything of that size is allocated; then it is decoded.
-//! Cost: the bytes of the file in memory beside its pixels. Limits: see each format; of an animation the first picture.
+//! Problem: documents, flat art, light probes, photographs and pictures for screens come in the same formats.
+//! Each caller would judge them anew, and compile the decoders again.
+//! Method: decoders read bytes in memory and are compiled here. A file is opened first ([`open`]), which
+//! tells its size, so that the caller's own limits come before anything of that size is allocated; then it is
+//! decoded.
+//! Cost: the bytes of the file in memory beside its pixels. Limits: see each format; of an animation the
+//! first picture.
 
 mod chunks;
 pub mod exact;
@@ -29,7 +31,8 @@ pub use exr::Primaries;
 pub use pixels::{Kind, Pixels, open_exr, png};
 pub use stored::{Fault, Format, Header, Samples, Stored};
 
-/// The format of a file by its first bytes; Targa files, which have no signature, by the ending of their name.
+/// The format of a file by its first bytes; Targa files, which have no signature, by the ending of their
+/// name.
 pub fn format(bytes: &[u8], path: &Path) -> Option<ImageFormat> {
     if bytes.starts_with(b"#?RGBE") {
         return Some(ImageFormat::Hdr);

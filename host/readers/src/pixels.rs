@@ -1,7 +1,8 @@
 //! Pictures that are made here, and their files.
 //!
-//! Method: a plain raster of one value a pixel. Its file is a PNG, or a JPEG where a page has many photographs; radiance is an
-//! OpenEXR file. Cost: the pixels, and the file in memory. Limits: 8 bits a sample, but for greys of 16 bits.
+//! Method: a plain raster of one value a pixel. Its file is a PNG, or a JPEG where a page has many
+//! photographs; radiance is an OpenEXR file. Cost: the pixels, and the file in memory. Limits: 8 bits a
+//! sample, but for greys of 16 bits.
 
 use std::io::{self, Cursor};
 

@@ -1,11 +1,11 @@
 //! The samples of a picture as its file stores them.
 //!
-//! Problem: maps, photographs and panoramas are measurements. Nothing of them may be rounded, and what a file says of their colours and
-//! of the way up is the caller's to use.
-//! Method: the first bytes tell the [`Format`]. [`Format::open`] reads the header, so that the caller's limits come before anything
-//! of the picture's size is allocated, and [`Header::decode`] reads the samples. OpenEXR and TIFF in floating point have readers
-//! of their own. Cost: the bytes of the file in memory beside its samples. Limits: grey or RGB, with or without opacity; of
-//! an animation the first picture.
+//! Problem: maps, photographs and panoramas are measurements. Nothing of them may be rounded, and what a file
+//! says of their colours and of the way up is the caller's to use.
+//! Method: the first bytes tell the [`Format`]. [`Format::open`] reads the header, so that the caller's
+//! limits come before anything of the picture's size is allocated, and [`Header::decode`] reads the samples.
+//! OpenEXR and TIFF in floating point have readers of their own. Cost: the bytes of the file in memory beside
+//! its samples. Limits: grey or RGB, with or without opacity; of an animation the first picture.
 
 use std::borrow::Cow;
 use std::io::Cursor;
@@ -57,7 +57,8 @@ impl From<ImageError> for Fault {
 pub struct Format(ImageFormat);
 
 impl Format {
-    /// The format by the first bytes; that of Targa files, which have no signature, by the ending of their name.
+    /// The format by the first bytes; that of Targa files, which have no signature, by the ending of their
+    /// name.
     ///
     /// # Errors
     /// An empty file, or one of no known format.
@@ -116,7 +117,7 @@ impl Format {
         if self.0 == ImageFormat::Tiff
             && let Some(mut file) = floats::float_tiff(bytes)?
         {
-            return Ok(of_floats(file.size(), file.channels(), file.turn(), Decoder::Tiff(file)));
+            return Ok(of_floats(file.size(), file.channels(), file.turn(), Decoder::Tiff(Box::new(file))));
         }
         let mut exposure = 1.0;
         let mut opened = if self.0 == ImageFormat::Hdr {
@@ -161,7 +162,7 @@ pub struct Header<'a> {
 
 enum Decoder<'a> {
     Exr(&'a [u8]),
-    Tiff(FloatTiff<'a>),
+    Tiff(Box<FloatTiff<'a>>),
     Whole(Opened<'a>),
 }
 

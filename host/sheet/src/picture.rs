@@ -1,7 +1,7 @@
 //! Pictures of exact dots as files.
 //!
-//! A picture that is data must come back bit by bit: a file with another size, depth or kind than expected is refused
-//! ([`readers::exact`]).
+//! A picture that is data must come back bit by bit: a file with another size, depth or kind than expected is
+//! refused ([`readers::exact`]).
 
 use std::io::BufReader;
 use std::path::Path;
@@ -20,7 +20,8 @@ pub fn write_png(
     write(path, |out| exact::write(out, size, Some(dpi), kind, data))
 }
 
-/// Reads a picture that must be of this size and kind; for an indexed one the colours may differ, not their number.
+/// Reads a picture that must be of this size and kind; for an indexed one the colours may differ, not their
+/// number.
 pub fn read_png(path: &Path, size: (usize, usize), kind: Exact) -> Result<Vec<u8>, FileError> {
     let file = std::fs::File::open(path).map_err(io(path, "open"))?;
     exact::read(BufReader::new(file), size, kind).map_err(|error| {

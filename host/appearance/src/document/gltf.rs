@@ -179,9 +179,7 @@ fn layers(
                     let gloss = Field::Map(picture.channel(3)).times(old.glossiness_factor);
                     (coloured(&picture, old.specular_factor, space), gloss)
                 }
-                None => {
-                    (old.specular_factor.map(Field::Constant), Field::Constant(old.glossiness_factor))
-                }
+                None => (old.specular_factor.map(Field::Constant), Field::Constant(old.glossiness_factor)),
             };
             (base, PbrWorkflow::Specular { f0, gloss })
         }

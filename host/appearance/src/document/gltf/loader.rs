@@ -63,12 +63,7 @@ impl<'a> Loader<'a, '_> {
     }
 
     /// The image of a map that must align with the others.
-    pub(super) fn load(
-        &mut self,
-        info: &Info,
-        field: &str,
-        decode: Decode,
-    ) -> Result<Loaded, DocumentError> {
+    pub(super) fn load(&mut self, info: &Info, field: &str, decode: Decode) -> Result<Loaded, DocumentError> {
         let placement = Placement::of(info);
         match self.placement {
             None => {

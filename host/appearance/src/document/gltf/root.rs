@@ -335,8 +335,14 @@ mod tests {
             (good[..33].to_vec(), "a length of 34 bytes, but the file has 33"),
             (container(2, 12, &[]), "a length of 12 bytes"),
             (container(2, 22, &[(b"BIN\0", b"{}")]), "expected the chunk JSON, found `BIN\\x00`"),
-            (container(2, 33, &[(b"JSON", b"{ }  "), (b"BIN\0", b"x")]), "BIN gives a length of 1 bytes, but 0"),
-            (container(2, 30, &[(b"JSON", b"{ }  "), (b"BIN\0", b"x")]), "5 bytes are left for the chunk BIN"),
+            (
+                container(2, 33, &[(b"JSON", b"{ }  "), (b"BIN\0", b"x")]),
+                "BIN gives a length of 1 bytes, but 0",
+            ),
+            (
+                container(2, 30, &[(b"JSON", b"{ }  "), (b"BIN\0", b"x")]),
+                "5 bytes are left for the chunk BIN",
+            ),
         ] {
             let error = chunks(&bytes).unwrap_err();
             assert!(error.contains(says), "{error}");
@@ -345,7 +351,8 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_named_by_its_path() {
-        let material = |inner: &str| format!(r#"{{"asset":{{"version":"2.0"}},"materials":[{{}},{{{inner}}}]}}"#);
+        let material =
+            |inner: &str| format!(r#"{{"asset":{{"version":"2.0"}},"materials":[{{}},{{{inner}}}]}}"#);
         for (text, path) in [
             (
                 material(r#""pbrMetallicRoughness":{"roughnessFactor":"high"}"#),
