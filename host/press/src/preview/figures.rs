@@ -148,7 +148,7 @@ mod tests {
         let line = Letters::Plain.height() + 4;
         let top = GAP + Letters::Title.height() + GAP + line;
         let at = |basis: usize, x: usize, y: usize| {
-            picture.get_pixel((GAP + basis * (SIDE + GAP) + x) as u32, (top + y) as u32).0[1]
+            picture.at((GAP + basis * (SIDE + GAP) + x) as u32, (top + y) as u32)[1]
         };
         let map = SIDE + GAP / 2 + 40;
         for basis in 0..2 {

@@ -191,7 +191,7 @@ mod tests {
             for x in GAP as u32..(GAP + 2 * ball + 6) as u32 {
                 let left = picture.at(x, y);
                 assert_eq!(left, picture.at(x + shift, y), "({x}, {y})");
-                lit += u32::from(left.0[0] > 60);
+                lit += u32::from(left[0] > 60);
             }
         }
         assert!(lit > 300, "{lit} pixels lit");

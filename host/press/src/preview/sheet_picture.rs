@@ -203,12 +203,12 @@ mod tests {
             .unwrap()
             .picture("a sheet", &notes)
             .unwrap();
-        assert_eq!(picture.width() as usize, GAP + 4 * (60 + GAP));
+        assert_eq!(picture.size().0 as usize, GAP + 4 * (60 + GAP));
         let first = (2 * GAP + Letters::Title.height() + Letters::Plain.height() + 6) as u32;
         let step = (Letters::Plain.height() + 6 + 40 + GAP) as u32;
         let mut seen = std::collections::BTreeSet::new();
         for y in first..first + 40 {
-            for x in GAP as u32..picture.width() - GAP as u32 {
+            for x in GAP as u32..picture.size().0 - GAP as u32 {
                 assert_eq!(picture.at(x, y), picture.at(x, y + step), "({x}, {y})");
                 seen.insert(picture.at(x, y));
             }
