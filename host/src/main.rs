@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let code = foilpress::cli::main();
+    let code = program::cli::main();
     #[cfg(windows)]
     window::stay();
     code

@@ -29,6 +29,21 @@ impl Observer for Silent {
     fn note(&self, _text: &str) {}
 }
 
+/// Hands on notes alone: for work beside a stage that is shown.
+pub struct Beside<'a>(pub &'a dyn Observer);
+
+impl Observer for Beside<'_> {
+    fn begin(&self, _stage: &str, _total: u64) {}
+
+    fn advance(&self, _steps: u64) {}
+
+    fn end(&self) {}
+
+    fn note(&self, text: &str) {
+        self.0.note(text);
+    }
+}
+
 /// An error with its causes: `what happened: its cause: the cause of that`.
 ///
 /// The text of an error in these crates never includes its source, so each cause is said once. Wherever an error becomes

@@ -7,6 +7,7 @@
 //! Source: what owners like of LPrint and PAPPL: the loaded sheet is set here, for dialogs can only read it.
 
 use std::fs;
+use std::io::Write as _;
 use std::net::IpAddr;
 use std::path::PathBuf;
 use std::sync::PoisonError;
@@ -28,7 +29,7 @@ use crate::template::{AUTO, SHEETS, TYPES, Ticket, keyword_of, size_of};
 use crate::worker;
 use device::forms;
 use device::ledger::{Ledger, totals};
-use press::preview::inks::{Ground, save_sheet};
+use press::preview::inks::{Ground, sheet_in_inks};
 use press::simulate::{Setup, print};
 use protocol::ink::Ink;
 
@@ -204,7 +205,8 @@ fn plan(server: &Server, id: u32) -> Result<Value, String> {
     let printed = printout.sheet().map_err(|error| with_causes(&error))?;
     let area = sheet::Area { left: 0, top: 0, width: printed.width(), length: printed.length() };
     let path = server.store.folder(id).join(PREVIEW);
-    save_sheet(&printed, area, 1, Ground::default(), &path).map_err(|error| with_causes(&error))?;
+    let picture = sheet_in_inks(&printed, area, 1, Ground::default()).map_err(|error| with_causes(&error))?;
+    files::write(&path, |out| out.write_all(&picture)).map_err(|error| with_causes(&error))?;
     let passes: Vec<Value> = checked
         .passes
         .iter()

@@ -9,7 +9,7 @@ use protocol::rgl::Resolution;
 use serde::{Deserialize, Serialize};
 
 use super::colours::colours;
-use super::picture::{read_png, write_png};
+use super::picture::{encoded, read_png, write_png};
 use super::{Area, DotMap, Sheet, check_stacks};
 use files::{FileError, read_toml, write_toml};
 use readers::exact::Exact;
@@ -185,18 +185,18 @@ impl Sheet {
         write_toml(&folder.join(SHEET), &text)
     }
 
-    /// Writes an area of the sheet in false colours, one for each stack, a pixel a dot. The sheet has `dpi` dots per inch across
-    /// and along.
+    /// An area of the sheet in false colours as PNG, one colour for each stack, a pixel a dot. The sheet has `dpi` dots per inch
+    /// across and along.
     ///
     /// # Errors
-    /// What the system refuses.
+    /// None is known: the data is of the picture's size.
     ///
     /// # Panics
     /// When the area leaves the sheet: a bug of the caller, never a matter of input.
-    pub fn save_colours(&self, area: Area, dpi: (u16, u16), path: &Path) -> Result<(), FileError> {
+    pub fn in_colours(&self, area: Area, dpi: (u16, u16)) -> std::io::Result<Vec<u8>> {
         let rows = self.index().chunks_exact(self.width()).skip(area.top).take(area.length);
         let dots: Vec<u8> = rows.flat_map(|row| &row[area.left..][..area.width]).copied().collect();
-        write_png(path, (area.width, area.length), dpi, Exact::Indexed(&colours(self.stacks())), &dots)
+        encoded((area.width, area.length), dpi, Exact::Indexed(&colours(self.stacks())), &dots)
     }
 
     /// Reads what [`Sheet::save`] wrote. Anything that does not fit is an error with the file and the field.

@@ -9,6 +9,16 @@ use std::path::Path;
 use files::{FileError, io, write};
 use readers::exact::{self, Exact, Inexact};
 
+/// A picture with so many pixels per inch across and down, as the bytes of a PNG.
+///
+/// # Errors
+/// Data of another size than the picture's.
+pub fn encoded(size: (usize, usize), dpi: (u16, u16), kind: Exact, data: &[u8]) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    exact::write(&mut bytes, size, Some(dpi), kind, data)?;
+    Ok(bytes)
+}
+
 /// Writes a picture with so many pixels per inch across and down.
 pub fn write_png(
     path: &Path,

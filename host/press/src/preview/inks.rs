@@ -5,16 +5,15 @@
 //! shows them in a label colour. Cost: one look at each dot. Limits: not a proof, because gloss and metal do not show; see
 //! [`super::flat()`] for lit sheets.
 
-use std::path::Path;
+use std::io;
 use std::str::FromStr;
 
 use readers::Pixels;
 use readers::exact::Exact;
 
 use crate::separate::Pass;
-use files::FileError;
 use sheet::colours::{label, upon};
-use sheet::picture::write_png;
+use sheet::picture::encoded;
 use sheet::{Area, Sheet};
 
 /// A background to print on, sRGB.
@@ -53,26 +52,20 @@ impl FromStr for Ground {
     }
 }
 
-/// Writes a picture of an area of a sheet in its inks, one pixel a dot; of a sheet with `across` dots in 1/600 inch, each row
+/// A picture of an area of a sheet in its inks as PNG, one pixel a dot; of a sheet with `across` dots in 1/600 inch, each row
 /// is repeated as often, so that the picture has the sheet's shape.
 ///
 /// # Errors
-/// The file cannot be written.
+/// None is known: the data is of the picture's size.
 ///
 /// # Panics
 /// If the area leaves the sheet, which is a bug of the caller.
-pub fn save_sheet(
-    sheet: &Sheet,
-    area: Area,
-    across: usize,
-    ground: Ground,
-    path: &Path,
-) -> Result<(), FileError> {
+pub fn sheet_in_inks(sheet: &Sheet, area: Area, across: usize, ground: Ground) -> io::Result<Vec<u8>> {
     let palette: Vec<[u8; 3]> = sheet.stacks().iter().map(|stack| upon(stack, ground.0)).collect();
     let rows = sheet.index().chunks_exact(sheet.width()).skip(area.top).take(area.length);
     let rows = rows.flat_map(|row| std::iter::repeat_n(row, across));
     let dots: Vec<u8> = rows.flat_map(|row| &row[area.left..][..area.width]).copied().collect();
-    write_png(path, (area.width, area.length * across), square(across), Exact::Indexed(&palette), &dots)
+    encoded((area.width, area.length * across), square(across), Exact::Indexed(&palette), &dots)
 }
 
 /// Pixels per inch of a picture in the sheet's shape.
@@ -81,24 +74,18 @@ fn square(across: usize) -> (u16, u16) {
     (dpi, dpi)
 }
 
-/// Writes a picture of an area of one pass in its ink, as [`save_sheet`] does.
+/// A picture of an area of one pass in its ink, as [`sheet_in_inks`] draws it.
 ///
 /// # Errors
-/// The file cannot be written.
+/// None is known: the data is of the picture's size.
 ///
 /// # Panics
-/// If the area leaves the plane, which is a bug of the caller.
-pub fn save_pass(
-    pass: &Pass,
-    area: Area,
-    across: usize,
-    ground: Ground,
-    path: &Path,
-) -> Result<(), FileError> {
+/// If the area leaves the sheet, which is a bug of the caller.
+pub fn pass_in_ink(pass: &Pass, area: Area, across: usize, ground: Ground) -> io::Result<Vec<u8>> {
     let palette = [ground.0, label(pass.ink, ground.0)];
     let rows = pass.plane.rows_in(area).map(Iterator::collect::<Vec<u8>>);
     let bits: Vec<u8> = rows.flat_map(|row| row.repeat(across)).collect();
-    write_png(path, (area.width, area.length * across), square(across), Exact::Two(&palette), &bits)
+    encoded((area.width, area.length * across), square(across), Exact::Two(&palette), &bits)
 }
 
 /// A picture of the whole sheet, which has `across` dots in 1/600 inch; at most `longest` pixels on its longer side. Each
@@ -193,11 +180,9 @@ mod tests {
 
     #[test]
     fn white_hides_the_ground_and_cyan_does_not() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("preview.png");
         let area = Area { left: 0, top: 2, width: 20, length: 3 };
-        save_sheet(&sheet(), area, 1, Ground([0x20, 0x40, 0x80]), &path).unwrap();
-        let picture = image::open(&path).unwrap().to_rgb8();
+        let png = sheet_in_inks(&sheet(), area, 1, Ground([0x20, 0x40, 0x80])).unwrap();
+        let picture = image::load_from_memory(&png).unwrap().to_rgb8();
         assert_eq!(picture.dimensions(), (20, 3));
         let at = |x: u32| picture.get_pixel(x, 1).0;
         assert_eq!(at(0), [0x20, 0x40, 0x80]);
@@ -208,12 +193,10 @@ mod tests {
 
     #[test]
     fn a_pass_shows_its_own_dots_only() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("pass.png");
         let plane = sheet::Plane { width: 20, length: 2, stride: 3, bits: vec![0, 0x18, 0, 0x80, 0, 0x10] };
         let area = Area { left: 4, top: 0, width: 16, length: 2 };
-        save_pass(&Pass { ink: Ink::White, plane }, area, 1, Ground([0; 3]), &path).unwrap();
-        let picture = image::open(&path).unwrap().to_rgb8();
+        let png = pass_in_ink(&Pass { ink: Ink::White, plane }, area, 1, Ground([0; 3])).unwrap();
+        let picture = image::load_from_memory(&png).unwrap().to_rgb8();
         let lit: Vec<(u32, u32)> =
             picture.enumerate_pixels().filter(|(_, _, p)| p.0[0] > 100).map(|(x, y, _)| (x, y)).collect();
         assert_eq!(lit, [(7, 0), (8, 0), (15, 1)]);

@@ -12,12 +12,14 @@ use appearance::gamut::Printable;
 use appearance::views::{self, Pictures};
 use clap::Args;
 use inks::{InkSet, InkSetError, Library, Trust};
+use make::choice::{Metric, name};
+use make::print::SEED;
 
 use appearance::document::{self, ColourSpace, Document};
 use appearance::factor::{self, Method};
 use appearance::gamut::{self, Intent};
 
-use crate::cli::arguments::choice::{Metric, choice, name, utf8, whole};
+use crate::cli::arguments::choice::{choice, utf8, whole};
 use crate::cli::console::usage;
 use crate::libraries;
 use observe::Observer;
@@ -148,14 +150,11 @@ pub struct FactorArgs {
     #[arg(long = "factor", value_name = "METHOD", default_value = "archetypes", value_parser = choice::<Method>())]
     pub method: Method,
     /// Seed of all random choices; equal seeds give equal prints
-    #[arg(long, default_value_t = FactorArgs::SEED)]
+    #[arg(long, default_value_t = SEED)]
     pub seed: u64,
 }
 
 impl FactorArgs {
-    /// The seed unless another is given.
-    pub const SEED: u64 = 1;
-
     /// Whether something about the bases was chosen.
     pub fn is_chosen(&self) -> bool {
         self.bases.is_some() || self.method != Method::default()

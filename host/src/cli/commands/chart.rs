@@ -4,14 +4,13 @@ use anyhow::{Context, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
 use inks::{InkSet, Library, Stack};
 use protocol::ink::Ink;
-use serde_json::Value;
 
 use crate::cli::arguments::layout::MediaArgs;
 use crate::cli::arguments::{HalftoneArg, InkArgs};
 use crate::cli::commands::preview::figure::mirroring;
 use crate::cli::output::Staged;
 use crate::cli::printing::deliver::DeliverArgs;
-use crate::cli::printing::{Artwork, JobArgs, ResultArgs};
+use crate::cli::printing::{self, JobArgs, ResultArgs, print_dots};
 use art::names::typed;
 use device::connection::Destination;
 use device::deliver::{Cartridges, find_cartridges};
@@ -224,8 +223,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
             let dots = chart::stacks(&all, stacks.job.layout.paper, stacks.strips)?;
             let layout = layout(&stacks.job, observer)?;
             chart::check_room("stacks", (dots.width(), dots.length()), &layout)?;
-            let artwork = artwork("stacks", &dots, set, &library);
-            print(&artwork, &layout, &stacks.job, observer)
+            print(("stacks", &dots), (set, &library), layout, &stacks.job, observer)
         }
         Chart::Registration(registration) => {
             let inks = once_each(&registration.inks)?;
@@ -299,26 +297,19 @@ const ON_HEADS: &str = "\nLook for: an area without streaks across the sheet (a 
 /// What to do with what was measured on the calibration chart, printed on it.
 const NEXT: [&str; 2] = ["3. foilpress profile set default --cross X,Ymm \\", "       --distance Dmm"];
 
-fn artwork<'a>(name: &'a str, dots: &'a DotMap, allowed: InkSet, library: &'a Library) -> Artwork<'a> {
-    Artwork {
-        name,
-        dots,
-        allowed,
-        library,
-        notes: &[],
-        suggestions: Vec::new(),
-        report: Value::Null,
-        advice: String::new(),
-    }
-}
-
 /// The page. Charts are there to be photographed.
 fn layout(args: &JobArgs, observer: &dyn Observer) -> Result<Layout> {
     Ok(Layout { camera_marks: true, ..args.layout.layout(observer)? })
 }
 
-fn print(artwork: &Artwork<'_>, layout: &Layout, args: &JobArgs, observer: &dyn Observer) -> Result<()> {
-    artwork.print(layout, &args.media, &args.result, &args.deliver, observer)
+fn print(
+    (name, dots): (&str, &DotMap),
+    inks: (InkSet, &Library),
+    layout: Layout,
+    args: &JobArgs,
+    observer: &dyn Observer,
+) -> Result<()> {
+    print_dots((name, dots, ""), inks, &args.page(layout), &args.result, &args.deliver, observer)
 }
 
 impl StepArgs {
@@ -336,8 +327,8 @@ impl StepArgs {
         let dots = make(&library)?;
         let name = format!("{name} {first} {second}");
         // Who names a foil wants it.
-        let artwork = artwork(&name, &dots, InkSet::ALL, &library);
-        print(&artwork, &layout, &self.job, observer).with_context(|| name.clone())
+        print((&name, &dots), (InkSet::ALL, &library), layout, &self.job, observer)
+            .with_context(|| name.clone())
     }
 }
 
@@ -369,9 +360,10 @@ impl WholePage {
     ) -> Result<()> {
         let library = Library::builtin();
         let allowed = InkSet::of(inks.iter().copied());
-        let artwork = Artwork { advice: advice.into(), ..artwork(name, dots, allowed, &library) };
         let layout = Layout { camera_marks, ..Layout::centred(self.paper) };
-        artwork.print(&layout, &self.media, &self.result, &self.deliver, observer)
+        let page = printing::page(layout, &self.media, &self.result);
+        let inks = (allowed, &library);
+        print_dots((name, dots, advice), inks, &page, &self.result, &self.deliver, observer)
     }
 }
 

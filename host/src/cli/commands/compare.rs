@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
 use inks::Library;
+use make::Print;
 
-use crate::cli::arguments::document_dots::{DocumentDots, DotsArgs};
+use crate::cli::arguments::document_dots::DotsArgs;
 use crate::cli::commands::preset::PresetArg;
 use crate::cli::commands::preview::subject::{is_printed, printed, printed_name};
 use crate::cli::console::{print_job, show};
@@ -121,8 +122,8 @@ impl Args {
                 "--mirror: a mirrored print is compared without its document; leave DOC out and give --job"
             );
         }
-        let prepared = self.dots.document_dots(observer)?;
-        let layout = Layout { camera_marks: true, ..prepared.layout.clone() };
+        let prepared = self.dots.dots(observer)?;
+        let layout = Layout { camera_marks: true, ..prepared.settings.page.layout.clone() };
         let page = arrange(&prepared.halftoned.dots, &layout, observer)?;
         if let Some(job) = &self.job
             && let Some(difference) = simulate::difference(&page.sheet, &print_job(job, observer)?)
@@ -138,7 +139,8 @@ impl Args {
             bail!("nothing of the document lies on the sheet")
         };
         let target = prepared.bases(observer)?;
-        let DocumentDots { document, library, halftoned, .. } = prepared;
+        let Print { document, settings, halftoned, .. } = prepared;
+        let library = settings.library;
         let mixture = mapped(&halftoned.mapped.mix, &library, &space());
         let sheet = page.sheet.dots().clone();
         Ok(Work { name: document.name, sheet, library, document: Some((target, mixture, area)) })

@@ -9,6 +9,7 @@ use appearance::document::{Document, SAMPLES, name_of, same_shape};
 use appearance::materials::{Materials, Reduced, resolution};
 use clap::Args as ClapArgs;
 use inks::{InkSet, Library, Stack};
+use make::Made;
 use press::layout::{Layout, Mm, Point};
 use press::preview::{Radiance, ToneCurve, picture};
 use rayon::prelude::*;
@@ -22,7 +23,7 @@ use view::display::{
 use crate::cli::arguments::choice::whole;
 use crate::cli::arguments::{DocumentArgs, InkArgs};
 use crate::cli::output::write;
-use crate::cli::printing::{self, JobArgs, Places};
+use crate::cli::printing::{JobArgs, Places};
 use observe::Observer;
 
 /// Stacks of a grid where none are named.
@@ -178,7 +179,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let notes: Vec<String> = images.iter().flat_map(Image::notes).cloned().collect();
     let work =
         Work { name: &args.name(), notes: &notes, grid: &grid, frames: &frames, placed, library: &library };
-    work.print(&args.job, (&layout, if args.stacks.is_empty() { set } else { InkSet::ALL }), places, observer)
+    work.print(&args.job, (layout, if args.stacks.is_empty() { set } else { InkSet::ALL }), places, observer)
 }
 
 fn size(materials: &dyn Materials) -> (usize, usize) {
@@ -285,23 +286,16 @@ impl Work<'_> {
     fn print(
         &self,
         job: &JobArgs,
-        (layout, allowed): (&Layout, InkSet),
+        (layout, allowed): (Layout, InkSet),
         places: Places,
         observer: &dyn Observer,
     ) -> Result<()> {
-        let dots = self.grid.dots()?;
-        let request = press::pipeline::Request {
-            name: self.name,
-            dots: &dots,
-            layout,
-            handling: job.media.handling(),
-            allowed,
-            library: self.library,
-        };
-        let ground = job.result.background.unwrap_or_default();
-        let made = printing::make(&request, self.notes, &[], places, ground, observer)?;
-        self.write(&made.folder, observer)?;
-        made.finish(self.report(), (&self.advice(), "display.html"), &job.result, &job.deliver, observer)
+        let (dots, page) = (self.grid.dots()?, job.page(layout));
+        let mut made = Made::proved(&page.request(self.name, &dots, allowed, self.library), &page, observer)?;
+        made.job.draft.plan.notes = self.notes.to_vec();
+        self.write(&places.write(&made, observer)?, observer)?;
+        let look = (&*self.advice(), "display.html");
+        places.finish(&made, self.report(), look, &job.result, &job.deliver, observer)
     }
 
     /// Masks, pictures of what is seen, and the page.

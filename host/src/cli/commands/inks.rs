@@ -244,11 +244,6 @@ fn find<'a>(library: &'a Library, text: &str) -> anyhow::Result<Cow<'a, Entry>> 
     }
 }
 
-/// Relative luminance of a linear Rec. 709 colour.
-pub fn luminance(rgb: [f64; 3]) -> f64 {
-    0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
-}
-
 #[derive(Serialize)]
 struct Row<'a> {
     number: usize,
@@ -288,7 +283,7 @@ fn list(library: &Library, inks: Option<InkSet>, json: bool) -> anyhow::Result<S
         "no.", "stack", "f(0)", "f(30)", "curve"
     )?;
     for entry in &entries {
-        let at = |degrees: f64| luminance(entry.curve.at(degrees.to_radians()));
+        let at = |degrees: f64| appearance::views::luminance(entry.curve.at(degrees.to_radians()));
         writeln!(
             text,
             "{:>3}  {:<10} {:>9.4} {:>9.4}  {:<10} {}",

@@ -5,9 +5,11 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args as ClapArgs;
 use inks::{InkSet, InkSetError, Library};
+use make::PageSettings;
+use make::layers::{Layers, Settings};
 use protocol::ink::Ink;
 use protocol::rgl::Resolution;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::cli::arguments::HalftoneArg;
 use crate::cli::arguments::choice::{choice, whole};
@@ -19,14 +21,11 @@ use crate::cli::output::{Staged, write};
 use crate::cli::printing::cut_lines;
 use crate::cli::printing::deliver::DeliverArgs;
 use crate::cli::printing::plan_output::PlanOutputArgs;
-use crate::cli::printing::{Artwork, ResultArgs};
-use art::{
-    Accept, Composed, Finish, GAMMAS, Intent, MOST_CHOKE_MM, Order, Pages, Room, TOLERANCES, White, names,
-};
+use crate::cli::printing::{self, Places, ResultArgs};
+use art::{Accept, Composed, Finish, GAMMAS, Intent, MOST_CHOKE_MM, Order, Pages, TOLERANCES, White, names};
 use observe::Observer;
-use press::job::plan::{Suggestion, grouped};
-use press::layout::{self, Layout, Mm, NoLength};
-use press::pipeline;
+use press::job::plan::grouped;
+use press::layout::{Layout, Mm, NoLength};
 use readers::resolution::RESOLUTIONS;
 use sheet::DOTS_PER_MM;
 use sheet::Size;
@@ -216,8 +215,7 @@ impl LayersArgs {
     }
 
     /// How the art is read.
-    pub fn options(&self, size: Option<Size>, layout: &Layout) -> Result<art::Options> {
-        let (width, length) = layout.largest();
+    fn options(&self, size: Option<Size>, cut_lines: bool) -> Result<art::Options> {
         Ok(art::Options {
             size,
             dpi: self.dpi,
@@ -229,12 +227,11 @@ impl LayersArgs {
                 (None, []) => Pages::Only,
                 (None, inks) => Pages::Inks(inks.to_vec()),
             },
-            across: layout.resolution.across(1).into(),
             tones: self.tones.as_deref().map_or(Ok(InkSet::EMPTY), |text| set("--tones", text))?,
             inks: self.inks()?,
-            cut_lines: false,
+            cut_lines,
             keep_white: self.accept.contains(&Accept::WhiteKept),
-            room: Room { width, length, cut: layout.cut },
+            ..art::Options::default()
         })
     }
 
@@ -264,8 +261,7 @@ impl LayersArgs {
     fn idle(
         &self,
         art: &art::Artwork,
-        options: &art::Options,
-        settings: &art::Settings,
+        Settings { read, compose: settings, .. }: &Settings,
         composed: &Composed,
     ) -> Vec<String> {
         let mut notes = Vec::new();
@@ -274,7 +270,7 @@ impl LayersArgs {
                 notes.push(format!("the art has no layer of {value}, so {option} has no effect"));
             }
         };
-        let tones = art.layers.iter().any(|layer| options.tones.contains(layer.ink));
+        let tones = art.layers.iter().any(|layer| read.tones.contains(layer.ink));
         lacks("--tones", &self.tones, !tones);
         let laid = &composed.report.laid;
         let knocks = laid.iter().any(|laid| settings.knockout.iter().any(|ink| ink.name() == laid.ink));
@@ -374,6 +370,7 @@ impl Args {
     /// The same choices as a print dialog makes them, for documents that come from elsewhere.
     #[cfg(feature = "serve")]
     pub fn choices(&self, observer: &dyn Observer) -> Result<queue::options::Choices> {
+        use press::layout::Position;
         use queue::options::{Choices, Place, Spots};
         let Work { layers, layout, media, .. } = &self.work;
         let (settings, layout, handling) = (layers.settings()?, layout.layout(observer)?, media.handling());
@@ -393,8 +390,8 @@ impl Args {
             gamma: settings.gamma,
             halftone: settings.halftone,
             place: match layout.position {
-                layout::Position::FromEdge(corner) => Place::At(corner),
-                layout::Position::FromPrintable(_) | layout::Position::Centred => Place::Page,
+                Position::FromEdge(corner) => Place::At(corner),
+                Position::FromPrintable(_) | Position::Centred => Place::Page,
             },
             mirror: layout.mirror,
             custom_paper: false,
@@ -407,40 +404,34 @@ impl Args {
 }
 
 impl Work {
-    /// Reads the art, composes it, and hands what is to be printed and its layout to `then`.
+    /// Reads the art, composes it, and hands what is to be printed to `then`. `page` makes the page of a layout.
     fn with<T>(
         &self,
+        page: impl FnOnce(Layout) -> PageSettings,
         observer: &dyn Observer,
-        then: impl FnOnce(&Artwork<'_>, &Layout) -> Result<T>,
+        then: impl FnOnce(&str, Layers<'_>) -> Result<T>,
     ) -> Result<T> {
         let library = self.layers.library()?;
         let layout = Layout { resolution: self.resolution, ..self.layout.layout(observer)? };
         let lines = self.cut_lines.as_deref().map(Staged::file).transpose()?;
-        let options = art::Options { cut_lines: lines.is_some(), ..self.layers.options(self.size, &layout)? };
-        let settings = self.layers.settings()?;
-        let art = art::open(&self.layers.art, &options, observer)?;
-        // Before the long work.
-        layout::check(art.width / usize::from(self.resolution.across(1)), art.length, &layout)?;
+        let settings = Settings {
+            read: self.layers.options(self.size, lines.is_some())?,
+            compose: self.layers.settings()?,
+            library,
+            page: page(layout),
+            how: advice::options_of,
+        };
+        let art = Layers::open(&self.layers.art, &settings, observer)?;
         let lines = match (lines, &self.cut_lines) {
-            (Some(staged), Some(to)) => Some((staged, cut_lines::drawing(&art, &layout, to)?)),
+            (Some(staged), Some(to)) => Some((staged, cut_lines::drawing(&art, &settings.page.layout, to)?)),
             _ => None,
         };
-        let mut composed = art::compose(&art, &settings, &library, observer)?;
-        for note in self.layers.idle(&art, &options, &settings, &composed) {
+        let mut layers = Layers::compose(&art, &settings, observer)?;
+        for note in self.layers.idle(&art, &settings, &layers.composed) {
             observer.note(&note);
-            composed.report.notes.push(note);
+            layers.composed.report.notes.push(note);
         }
-        let artwork = Artwork {
-            name: &art.name,
-            dots: &composed.dots,
-            allowed: settings.inks,
-            library: &library,
-            notes: &composed.report.notes,
-            suggestions: suggestions(&composed, &settings.inks),
-            report: json!({ "art": { "composed": composed.report } }),
-            advice: words(&composed),
-        };
-        let done = then(&artwork, &layout)?;
+        let done = then(&art.name, layers)?;
         if let Some((staged, drawing)) = lines {
             write(staged.path(), drawing.as_bytes())?;
             staged.commit()?;
@@ -452,30 +443,26 @@ impl Work {
 /// Runs `layers`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let Args { work, result, deliver } = args;
-    work.with(observer, |artwork, layout| artwork.print(layout, &work.media, result, deliver, observer))
+    let page = |layout| printing::page(layout, &work.media, result);
+    work.with(page, observer, |name, layers| {
+        let places = Places::new(name, result, deliver)?;
+        let advice = words(&layers.composed);
+        let made = layers.made(observer)?;
+        places.write(&made, observer)?;
+        places.finish(&made, Value::Null, (&advice, "preview.png"), result, deliver, observer)
+    })
 }
 
 /// Runs `plan layers`.
 pub fn plan(args: &PlanArgs, observer: &dyn Observer) -> Result<()> {
-    let page = args.output.stage()?;
-    args.work.with(observer, |artwork, layout| {
-        let mut draft = pipeline::draft(&artwork.request(layout, &args.work.media), observer)?;
-        draft.plan.notes = artwork.notes.to_vec();
-        draft.plan.suggestions.clone_from(&artwork.suggestions);
-        args.output.show(page, draft.into(), &artwork.report, &artwork.advice)
+    let staged = args.output.stage()?;
+    let handling = args.work.media.handling();
+    let page = |layout| PageSettings { layout, handling, ..PageSettings::default() };
+    args.work.with(page, observer, |_, layers| {
+        let draft = layers.draft(observer)?;
+        let report = json!({ "art": { "composed": layers.composed.report } });
+        args.output.show(staged, draft.into(), &report, &words(&layers.composed))
     })
-}
-
-/// Suggestions with the options that follow them.
-fn suggestions(composed: &Composed, allowed: &InkSet) -> Vec<Suggestion> {
-    let suggestions = composed.suggestions.iter();
-    suggestions
-        .map(|art::Suggestion { text, remedy, dots }| Suggestion {
-            text: text.clone(),
-            how: advice::options_of(remedy, allowed),
-            dots: *dots,
-        })
-        .collect()
 }
 
 /// What was laid, in words.

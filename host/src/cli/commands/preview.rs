@@ -12,13 +12,15 @@ use std::path::{Path, PathBuf};
 use ::view::{Glb, Lit, Renderer, finer, glb, places_for_dot_gain, proportions};
 use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
+use make::shown::png;
+use make::view::Show;
 use observe::Observer;
 use press::preview::{Probe, Radiance};
 use serde_json::json;
 
 use self::figure::Figure;
-use self::subject::{PreviewSubject, png};
-use self::view::{Show, ViewArgs};
+use self::subject::PreviewSubject;
+use self::view::ViewArgs;
 use self::wear::{Told, WearArgs};
 use crate::cli::arguments::choice::whole;
 use crate::cli::arguments::document_dots::DotsArgs;
@@ -105,11 +107,13 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     if let Some(figure) = args.figure {
         return draw_figure(args, figure, format, probe, staged, observer);
     }
-    let (what, is_page) = (args.view.what(), format == Format::Page);
+    let (what, is_page) = (args.view.show.unwrap_or(Show::Printed), format == Format::Page);
     let with_bases = what != Show::Printed || is_page;
     args.wear.check(what == Show::Printed || is_page, is_page)?;
     let mut shown = PreviewSubject::open(&args.dots, with_bases, observer)?;
     shown.worn = args.wear.apply(&mut shown.dots, &shown.library)?;
+    let subject = shown;
+    let shown = subject.shown();
     if shown.target.is_none() && what != Show::Printed {
         bail!(
             "--show {}: {} has printed dots and no document; leave --show out, or name a document",
@@ -118,7 +122,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         );
     }
     let (tone, (width, height)) = if is_page {
-        let page = shown.page(&args.view, probe.as_ref(), observer)?;
+        let page = shown.page(&args.view.view(shown.size(), probe)?, observer)?;
         fs::write(staged.path(), page.html)
             .with_context(|| format!("cannot write {}", args.output.display()))?;
         (page.tone, page.pixels)
@@ -136,16 +140,17 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
             }
             let lit = Lit::new(&shown.source(what, &stacks), size, places)?;
             Ok(match args.wear.dot_gain {
-                Some(n) => lit.with_dot_gain(&shown.space, n),
+                Some(n) => lit.with_dot_gain(shown.space, n),
                 None => lit,
             })
         };
         let pixels = f64::from(args.pixels);
         if format == Format::Glb {
-            let glb = glb(&lit(pixels)?, &shown.space, &shown.name, observer)?;
-            return write_glb(args, &glb, &shown, staged);
+            let glb = glb(&lit(pixels)?, shown.space, shown.name, observer)?;
+            return write_glb(args, &glb, &subject, staged);
         }
-        let scene = args.view.scene(size, width as f64 / height as f64, probe)?;
+        let view = args.view.view(size, probe)?;
+        let scene = view.scene(size, width as f64 / height as f64)?;
         let pixels = pixels * args.view.zoom;
         let radiance = match args.view.seen_from {
             Some(metres) => {
@@ -163,7 +168,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         if radiance.pixels.iter().all(|[light @ .., _]| *light == [0.0; 3]) {
             observer.note("no light falls on what is seen of the sheet, so all of it is black; --light 0,0 is straight above it");
         }
-        let tone = args.view.tone(&radiance);
+        let tone = view.tone(&radiance);
         match format {
             Format::Exr => write_exr(&radiance, staged.path())?,
             _ => fs::write(staged.path(), png(&radiance, tone)?)?,
@@ -178,12 +183,12 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         let report = json!({
             "written": args.output.display().to_string(), "bytes": bytes, "name": shown.name, "size_mm": size_mm,
             "pixels": [width, height], "exposure_stops": tone.in_stops(), "tone_curve": tone.knee, "zoom": args.view.zoom,
-            "seen_from_mm": args.view.seen_from.map(|metres| 1000.0 * metres), "worn": shown.worn.as_ref().map(Told::json),
+            "seen_from_mm": args.view.seen_from.map(|metres| 1000.0 * metres), "worn": subject.worn.as_ref().map(Told::json),
         });
         writeln!(out, "{}", serde_json::to_string_pretty(&report)?)?;
     } else {
         writeln!(out, "{} ({:.1} MB)", args.output.display(), bytes as f64 / 1e6)?;
-        shown.say(&mut out)?;
+        subject.say(&mut out)?;
     }
     Ok(())
 }

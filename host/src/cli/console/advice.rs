@@ -1,9 +1,12 @@
 //! Which options help: libraries name what is wrong, what to do and the settings to do it with, only the command line knows its
 //! options.
 
-use art::{Accept, Remedy, Settings};
+use std::error::Error;
+
+use art::{Remedy, Settings};
 use halftone::HalftoneError;
 use inks::InkSet;
+use make::choice::name;
 use observe::{Hint, with_hints};
 use press::chart::ChartError;
 use press::layout::{LayoutError, SizeError};
@@ -12,12 +15,15 @@ use press::pipeline::document::StageError;
 use press::simulate::PrintoutError;
 use protocol::ink::Ink;
 
-use crate::cli::arguments::choice::Choice;
-
 /// An error with its causes, and what to do about it in words and options of the command line.
 pub fn explained(error: &anyhow::Error) -> (String, Vec<String>) {
-    let (text, hints) = with_hints(error.as_ref());
+    let (text, hints) = with_hints(stage(error.as_ref()));
     (text, hints.into_iter().map(in_options).chain(of(error)).collect())
+}
+
+/// The error of the stage that refused, if it is one of the library's.
+fn stage<'a>(error: &'a (dyn Error + 'static)) -> &'a (dyn Error + 'static) {
+    error.downcast_ref().map_or(error, make::Error::stage)
 }
 
 /// A hint with the options that change its settings.
@@ -33,7 +39,7 @@ fn in_options(hint: &Hint) -> String {
 
 /// Which options to try, if this error is one of those that options help against.
 fn of(error: &anyhow::Error) -> Option<String> {
-    error.chain().find_map(|cause| {
+    error.chain().map(stage).find_map(|cause| {
         let layout = cause.downcast_ref::<LayoutError>();
         let layout = layout.or_else(|| match cause.downcast_ref()? {
             JobError::Layout(error) => Some(error),
@@ -84,11 +90,7 @@ fn of(error: &anyhow::Error) -> Option<String> {
 /// The options that follow a suggestion, if `allowed` are the inks that may be used now.
 pub fn options_of(remedy: &Remedy, allowed: &InkSet) -> String {
     match remedy {
-        Remedy::Accept(accept) => {
-            let name =
-                Accept::ALL.iter().find(|(known, ..)| known == accept).map_or("", |(_, name, _)| *name);
-            format!("--accept {name}")
-        }
+        Remedy::Accept(accept) => format!("--accept {}", name(*accept)),
         Remedy::Media(media) => format!("--media {}", media.name()),
         Remedy::Order(inks) => format!("--order {}", names(inks.iter().copied())),
         Remedy::Without(ink) if *allowed == Settings::default().inks => format!("--inks -{}", ink.name()),
@@ -102,6 +104,8 @@ fn names(inks: impl Iterator<Item = Ink>) -> String {
 
 #[cfg(test)]
 mod tests {
+    use art::Accept;
+    use make::choice::Choice as _;
     use observe::{Diagnosis, Fault};
 
     use super::*;

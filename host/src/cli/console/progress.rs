@@ -68,18 +68,3 @@ impl Observer for Progress {
         });
     }
 }
-
-/// Hands on notes alone: for work beside a stage that is shown.
-pub struct Beside<'a>(pub &'a dyn Observer);
-
-impl Observer for Beside<'_> {
-    fn begin(&self, _stage: &str, _total: u64) {}
-
-    fn advance(&self, _steps: u64) {}
-
-    fn end(&self) {}
-
-    fn note(&self, text: &str) {
-        self.0.note(text);
-    }
-}

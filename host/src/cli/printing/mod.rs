@@ -1,6 +1,4 @@
-//! From dots to everything a print is: page, passes, job, pictures, plan, and the way to the printer.
-//!
-//! What everything that is printed has in common, whatever made the dots.
+//! From what was made to where it goes: the folder of a print, the plan on the terminal, and the way to the printer.
 
 pub mod cut_lines;
 pub mod deliver;
@@ -12,19 +10,18 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use inks::{InkSet, Library};
+use make::{Made, PageSettings};
 use rayon::prelude::*;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use crate::cli::arguments::layout::{LayoutArgs, MediaArgs};
 use crate::cli::commands::ledger;
 use crate::cli::console::show;
 use crate::cli::output::{self, Kind, Staged, write};
 use crate::cli::printing::deliver::DeliverArgs;
-use observe::Observer;
-use press::job::plan::Suggestion;
+use observe::{Beside, Observer};
 use press::layout::Layout;
-use press::pipeline::{self, Draft, Job, Request};
-use press::preview::inks::{Ground, save_pass, save_sheet};
+use press::preview::inks::Ground;
 use press::separate;
 use sheet::DotMap;
 
@@ -39,6 +36,34 @@ pub struct JobArgs {
     pub result: ResultArgs,
     #[command(flatten)]
     pub deliver: DeliverArgs,
+}
+
+impl JobArgs {
+    /// What the page and its pictures are like, on this layout.
+    pub fn page(&self, layout: Layout) -> PageSettings {
+        page(layout, &self.media, &self.result)
+    }
+}
+
+/// What a page and its pictures are like.
+pub fn page(layout: Layout, media: &MediaArgs, result: &ResultArgs) -> PageSettings {
+    let ground = result.background.unwrap_or_default();
+    PageSettings { layout, handling: media.handling(), ground, prices: ledger::prices() }
+}
+
+/// Makes a job of the dots of a chart, writes everything, shows the plan and sends the job.
+pub fn print_dots(
+    (name, dots, advice): (&str, &DotMap, &str),
+    (allowed, library): (InkSet, &Library),
+    page: &PageSettings,
+    result: &ResultArgs,
+    deliver: &DeliverArgs,
+    observer: &dyn Observer,
+) -> Result<()> {
+    let places = Places::new(name, result, deliver)?;
+    let made = Made::proved(&page.request(name, dots, allowed, library), page, observer)?;
+    places.write(&made, observer)?;
+    places.finish(&made, Value::Null, (advice, "preview.png"), result, deliver, observer)
 }
 
 /// Where results go and how they look.
@@ -84,6 +109,64 @@ impl Places {
         Ok(Places { target, folder, also })
     }
 
+    /// Writes what every print has: the job, its passes, pictures and pages. Returns the folder, which has another name yet.
+    pub fn write(&self, made: &Made, observer: &dyn Observer) -> Result<PathBuf> {
+        let folder = self.folder.create()?.to_path_buf();
+        write(&folder.join("job.rgl"), &made.job.bytes)?;
+        let passes = folder.join("passes");
+        fs::create_dir(&passes).with_context(|| format!("cannot write {}", passes.display()))?;
+        let beside = Beside(observer);
+        let picture = |name: &String| write(&folder.join(name), &made.picture(name, &beside)?);
+        let page = |name: &&str| write(&folder.join(name), made.page(name, &beside)?.as_bytes());
+        let dpi = made.plan().resolution_dpi;
+        // One thread compresses a picture, so they are made beside each other.
+        let (pages, (pictures, passes)) = rayon::join(
+            || made.pages().par_iter().with_max_len(1).try_for_each(page),
+            || {
+                rayon::join(
+                    || made.pictures().par_iter().with_max_len(1).try_for_each(picture),
+                    || separate::files::save(&made.job.draft.separation, dpi, &passes),
+                )
+            },
+        );
+        pages?;
+        pictures?;
+        passes?;
+        Ok(folder)
+    }
+
+    /// Writes the report, makes everything appear, shows the plan and sends the job. `more` is what else the report
+    /// holds (an object, or null for nothing), `advice` what else to say below the plan, and `picture` the file to look at.
+    pub fn finish(
+        self,
+        made: &Made,
+        more: Value,
+        (advice, picture): (&str, &str),
+        result: &ResultArgs,
+        deliver: &DeliverArgs,
+        observer: &dyn Observer,
+    ) -> Result<()> {
+        let mut report = made.report();
+        if let Value::Object(more) = more {
+            more.into_iter().for_each(|(name, value)| report[name] = value);
+        }
+        let report = serde_json::to_string_pretty(&report)?;
+        write(&self.folder.path().join("report.json"), report.as_bytes())?;
+        let target = self.target.clone();
+        self.commit(&made.job.bytes)?;
+        if result.json {
+            show(&format!("{report}\n"))?;
+        } else {
+            let plan = made.plan();
+            show(&format!(
+                "{plan}{advice}\nThe simulated printer made exactly this sheet. See {}; {} is the plan on one page.\n",
+                target.join(picture).display(),
+                target.join("plan.html").display()
+            ))?;
+        }
+        deliver.send(&made.job, observer)
+    }
+
     /// Everything appears.
     fn commit(self, job: &[u8]) -> Result<()> {
         if let Some(also) = &self.also {
@@ -99,141 +182,4 @@ impl Places {
 
 fn absolute(path: &Path) -> Result<PathBuf> {
     std::path::absolute(path).with_context(|| format!("`{}` is not a path", path.display()))
-}
-
-/// A job that was proved on the simulated printer and written where it will appear.
-pub struct Made {
-    /// The job.
-    pub job: Job,
-    /// The folder it was written to, which has another name yet.
-    pub folder: PathBuf,
-    places: Places,
-}
-
-/// Makes a job, proves it, and writes what every print has: the job, its passes, the plan as a page, and the dots as the
-/// simulated printer printed them: all inks on the ground, and each pass by itself. `notes` are what the readers had to
-/// assume, `suggestions` what would improve the print.
-pub fn make(
-    request: &Request<'_>,
-    notes: &[String],
-    suggestions: &[Suggestion],
-    places: Places,
-    ground: Ground,
-    observer: &dyn Observer,
-) -> Result<Made> {
-    let mut job = pipeline::job(request, observer)?;
-    job.draft.plan.notes = notes.to_vec();
-    job.draft.plan.suggestions = suggestions.to_vec();
-    job.draft.plan.price(&ledger::prices());
-    let printout = job.prove(observer)?;
-    let Draft { sheet, laid, separation, plan } = &job.draft;
-    let folder = places.folder.create()?.to_path_buf();
-    write(&folder.join("job.rgl"), &job.bytes)?;
-    let passes = folder.join("passes");
-    fs::create_dir(&passes).with_context(|| format!("cannot write {}", passes.display()))?;
-    let (across, dpi) = (plan_output::across(plan), plan.resolution_dpi);
-    // One thread compresses a picture, so they are written beside each other, the largest first.
-    let pictures: [&(dyn Fn() -> Result<()> + Sync); 5] = [
-        // The page is the simulated sheet, dot for dot.
-        &|| Ok(save_sheet(sheet, laid.area, across, ground, &folder.join("preview.png"))?),
-        &|| Ok(sheet.save_colours(laid.area, dpi, &folder.join("separation.png"))?),
-        &|| {
-            let html = plan_output::page(plan, sheet, &separation.passes, laid.area, ground)?;
-            write(&folder.join("plan.html"), html.as_bytes())
-        },
-        &|| {
-            printout.passes.par_iter().enumerate().try_for_each(|(i, pass)| {
-                let name = format!("preview-{:02}-{}.png", i + 1, pass.ink.name());
-                Ok(save_pass(pass, laid.area, across, ground, &folder.join(name))?)
-            })
-        },
-        &|| Ok(separate::files::save(separation, dpi, &passes)?),
-    ];
-    pictures.par_iter().with_max_len(1).try_for_each(|picture| picture())?;
-    Ok(Made { job, folder, places })
-}
-
-impl Made {
-    /// Writes the report, makes everything appear, shows the plan and sends the job. `more` is what else the report
-    /// holds, `advice` what else to say below the plan, and `picture` the file to look at.
-    pub fn finish(
-        self,
-        more: Value,
-        (advice, picture): (&str, &str),
-        result: &ResultArgs,
-        deliver: &DeliverArgs,
-        observer: &dyn Observer,
-    ) -> Result<()> {
-        let Made { job, folder, places } = self;
-        let plan = &job.draft.plan;
-        let mut report = json!({
-            "program": concat!("foilpress ", env!("CARGO_PKG_VERSION")),
-            "document": { "name": plan.document },
-            "plan": plan,
-            "job": { "bytes": job.bytes.len() },
-        });
-        if let Value::Object(more) = more {
-            for (name, value) in more {
-                report[name] = value;
-            }
-        }
-        let report = serde_json::to_string_pretty(&report)?;
-        write(&folder.join("report.json"), report.as_bytes())?;
-        let target = places.target.clone();
-        places.commit(&job.bytes)?;
-        if result.json {
-            show(&format!("{report}\n"))?;
-        } else {
-            show(&format!(
-                "{plan}{advice}\nThe simulated printer made exactly this sheet. See {}; {} is the plan on one page.\n",
-                target.join(picture).display(),
-                target.join("plan.html").display()
-            ))?;
-        }
-        deliver.send(&job, observer)
-    }
-}
-
-/// Flat art or a chart that is to be printed.
-pub struct Artwork<'a> {
-    /// Its name.
-    pub name: &'a str,
-    /// Its dots.
-    pub dots: &'a DotMap,
-    /// The inks the user allowed; a foil among them is consent to print it.
-    pub allowed: InkSet,
-    /// The library.
-    pub library: &'a Library,
-    /// What the readers had to assume.
-    pub notes: &'a [String],
-    /// What would improve the print.
-    pub suggestions: Vec<Suggestion>,
-    /// What else the report should hold: an object, or null for nothing.
-    pub report: Value,
-    /// What else to say below the plan; empty for nothing.
-    pub advice: String,
-}
-
-impl<'a> Artwork<'a> {
-    /// The job to make of it.
-    pub fn request(&self, layout: &'a Layout, media: &MediaArgs) -> Request<'a> {
-        let Artwork { name, dots, allowed, library, .. } = *self;
-        Request { name, dots, layout, handling: media.handling(), allowed, library }
-    }
-
-    /// Makes a job of it, writes everything, shows the plan and sends the job.
-    pub fn print(
-        &self,
-        layout: &'a Layout,
-        media: &MediaArgs,
-        result: &ResultArgs,
-        deliver: &DeliverArgs,
-        observer: &dyn Observer,
-    ) -> Result<()> {
-        let places = Places::new(self.name, result, deliver)?;
-        let ground = result.background.unwrap_or_default();
-        let request = self.request(layout, media);
-        let made = make(&request, self.notes, &self.suggestions, places, ground, observer)?;
-        made.finish(self.report.clone(), (&self.advice, "preview.png"), result, deliver, observer)
-    }
 }

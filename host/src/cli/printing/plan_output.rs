@@ -4,23 +4,17 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use rayon::prelude::*;
+use make::made::{Drawn, plan_page};
 use serde_json::Value;
 
 use crate::cli::commands::ledger;
 use crate::cli::console::show;
 use crate::cli::output::{Staged, write};
-use press::job::page::{self, Pictures};
 use press::job::plan::Plan;
 use press::pipeline::Draft;
-use press::preview::inks::{Ground, pass_thumbnail, thumbnail};
+use press::preview::inks::Ground;
 use press::separate::Pass;
 use sheet::{Area, Sheet};
-
-/// Pixels of the longer side of the sheet on the plan's page.
-const THUMBNAIL: usize = 640;
-/// The same for a pass.
-const PASS_THUMBNAIL: usize = 320;
 
 /// A plan and what is drawn of it.
 pub struct DrawnPlan {
@@ -39,24 +33,6 @@ impl From<Draft> for DrawnPlan {
         let Draft { sheet, laid, separation, plan } = draft;
         DrawnPlan { plan, sheet, passes: separation.passes, area: laid.area }
     }
-}
-
-/// Dots across in 1/600 inch.
-pub fn across(plan: &Plan) -> usize {
-    usize::from(plan.resolution_dpi.0 / 600).max(1)
-}
-
-/// The plan as a page with its pictures on this ground.
-pub fn page(plan: &Plan, sheet: &Sheet, passes: &[Pass], area: Area, ground: Ground) -> Result<String> {
-    let across = across(plan);
-    let pictures = Pictures {
-        sheet: thumbnail(sheet, across, ground, THUMBNAIL),
-        passes: passes
-            .par_iter()
-            .map(|pass| pass_thumbnail(pass, area, across, ground, PASS_THUMBNAIL))
-            .collect(),
-    };
-    Ok(page::html(plan, &pictures)?)
 }
 
 /// How a plan is shown.
@@ -91,7 +67,8 @@ impl PlanOutputArgs {
         drawn.plan.price(&ledger::prices());
         let DrawnPlan { plan, sheet, passes, area } = &drawn;
         if let Some(staged) = staged {
-            let html = page(plan, sheet, passes, *area, self.background.unwrap_or_default())?;
+            let drawn = Drawn { sheet, passes, area: *area };
+            let html = plan_page(plan, drawn, self.background.unwrap_or_default())?;
             write(staged.path(), html.as_bytes())?;
             staged.commit()?;
         }

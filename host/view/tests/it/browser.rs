@@ -7,10 +7,10 @@ use appearance::edit::{Steps, apply, fingerprint};
 use appearance::factor::Factored;
 use appearance::weights::{ONE, WeightMaps};
 use image::RgbImage;
-use readers::Pixels;
 use inks::{Curve, Library, Stack};
 use observe::Silent;
 use press::preview::{Probe, Source, ToneCurve, picture};
+use readers::Pixels;
 use sheet::{Area, DotMap};
 use testing::browser::Browser;
 use view::page::{LONGEST, Subject, Target, page};
@@ -336,10 +336,7 @@ fn the_page_draws_what_the_renderer_draws_in_a_browser() {
             picture(&press::preview::Radiance { width: 1, height: 1, pixels }, ToneCurve::PAPER).unwrap();
         let off = (0..3).map(|c| found.0[c].abs_diff(expected.at(0, 0)[c])).max().unwrap();
         if off > 2 {
-            failed.push(format!(
-                "dot at ({x}, {y}), stack {stack}: {found:?}, not {:?}",
-                expected.at(0, 0)
-            ));
+            failed.push(format!("dot at ({x}, {y}), stack {stack}: {found:?}, not {:?}", expected.at(0, 0)));
             break;
         }
         seen += 1;

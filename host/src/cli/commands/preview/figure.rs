@@ -41,18 +41,14 @@ pub fn figure(
     if figure == Figure::Near {
         return near(work, observer);
     }
-    let prepared = work.document_dots(observer)?;
+    let prepared = work.dots(observer)?;
     let name = &prepared.document.name;
     if figure == Figure::Lights {
         let dots = &prepared.halftoned.dots;
         let space = prepared.document.materials().space();
-        let stacks = reflectances(dots.stacks(), &prepared.library, space);
+        let stacks = reflectances(dots.stacks(), &prepared.settings.library, space);
         let print = Source::Print { dots, space, stacks: &stacks, area: Area::whole(dots) };
-        let target = match prepared.document.as_factored() {
-            Some(factored) => Source::Factored(factored),
-            None => Source::Document(prepared.document.materials()),
-        };
-        let panels = Panels::lit(&target, &print, &SIX_LIGHTS, 300, observer)?.without_dots();
+        let panels = Panels::lit(&prepared.target(), &print, &SIX_LIGHTS, 300, observer)?.without_dots();
         return Ok(panels.picture(name, &[])?);
     }
     let bases = prepared.bases(observer)?;
@@ -61,9 +57,10 @@ pub fn figure(
     }
     // Each basis as a document of its own: what the inks come nearest to, and what keeps their differences.
     let alone = bases_alone(&bases)?;
-    let printable = Printable::combined(&prepared.library, &prepared.settings.inks, &bases.space);
+    let printable =
+        Printable::combined(&prepared.settings.library, &prepared.settings.dots.inks, &bases.space);
     let map = |intent, gloss| -> Result<Mapped> {
-        let settings = GamutSettings { intent, gloss, eye: None, ..prepared.settings.gamut.clone() };
+        let settings = GamutSettings { intent, gloss, eye: None, ..prepared.settings.dots.gamut.clone() };
         let bases = || Ok::<_, gamut::GamutError>(Cow::Borrowed(&alone));
         Ok(gamut::map(&alone, bases, &printable, &settings, &observe::Silent)?)
     };
@@ -71,9 +68,9 @@ pub fn figure(
     let mapped = map(Intent::Basis, GamutSettings::default().gloss)?;
     let columns = [
         ("document", alone.bases.clone()),
-        ("stacks in use", stacks(&mapped, &prepared.library, &alone)),
-        ("clamped", mixed(&clamped, &prepared.library, &alone)),
-        ("mapped", mixed(&mapped, &prepared.library, &alone)),
+        ("stacks in use", stacks(&mapped, &prepared.settings.library, &alone)),
+        ("clamped", mixed(&clamped, &prepared.settings.library, &alone)),
+        ("mapped", mixed(&mapped, &prepared.settings.library, &alone)),
     ];
     Ok(balls_picture(name, &bases.space, &columns, probe, observer)?)
 }
@@ -84,9 +81,9 @@ fn near(work: &DotsArgs, observer: &dyn Observer) -> Result<Pixels<[u8; 3]>> {
     if let Some(dots) = printed(path, observer)? {
         return mirroring(&printed_name(path), &dots, inked(&dots), &work.inks.library()?, observer);
     }
-    let prepared = work.document_dots(observer)?;
+    let prepared = work.dots(observer)?;
     let dots = &prepared.halftoned.dots;
-    mirroring(&prepared.document.name, dots, Area::whole(dots), &prepared.library, observer)
+    mirroring(&prepared.document.name, dots, Area::whole(dots), &prepared.settings.library, observer)
 }
 
 /// An area of dots before a checkerboard.

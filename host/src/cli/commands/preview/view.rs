@@ -1,24 +1,15 @@
-//! How a sheet is looked at: what is shown, lights, eye and pose, as options and as a page's address.
+//! How a sheet is looked at, as options.
 
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use ::view::{Camera, Light, Pose, Scene, direction};
 use anyhow::{Result, bail};
-use clap::{Args, ValueEnum};
+use clap::Args;
+use make::view::{Show, View};
 use press::layout::{Mm, Point};
-use press::preview::{Probe, Radiance, ToneCurve};
+use press::preview::{Probe, ToneCurve};
 
-/// What is shown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Show {
-    /// The document itself
-    Document,
-    /// The mixtures of inks that stand for it
-    Mapped,
-    /// The printed dots
-    Printed,
-}
+use crate::cli::arguments::choice::choice;
 
 /// A direction in degrees: azimuth to the right, elevation upwards.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,11 +95,11 @@ fn numbers<const N: usize>(text: &str, expected: &str) -> Result<[f64; N], Strin
     values.and_then(|values| values.try_into().ok()).ok_or_else(|| format!("expected {expected}"))
 }
 
-/// Options of the picture. The default is what they are when none is given.
+/// Options of the picture.
 #[derive(Args, Debug)]
 pub struct ViewArgs {
     /// What to show first or in a picture [default: printed]
-    #[arg(long, value_name = "WHAT", value_enum)]
+    #[arg(long, value_name = "WHAT", value_parser = choice::<Show>())]
     pub show: Option<Show>,
     /// Direction of a light, with its distance in metres if it is near; up to four times [default: -25,30,0.6]
     #[arg(long, value_name = "AZ,EL[,M]", allow_hyphen_values = true)]
@@ -147,26 +138,6 @@ pub struct ViewArgs {
     tone_curve: f32,
 }
 
-impl Default for ViewArgs {
-    fn default() -> ViewArgs {
-        let level = Degrees(0.0, 0.0);
-        ViewArgs {
-            show: None,
-            light: Vec::new(),
-            light_probe: None,
-            view: level,
-            distance: Distance(Some(0.5)),
-            zoom: 1.0,
-            middle: None,
-            seen_from: None,
-            tilt: level,
-            curl: None,
-            exposure: None,
-            tone_curve: ToneCurve::PAPER.knee,
-        }
-    }
-}
-
 fn stops(text: &str) -> Result<f32, String> {
     match text.parse() {
         Ok(stops) if (-10.0..=10.0).contains(&stops) => Ok(stops),
@@ -182,22 +153,25 @@ fn share(text: &str) -> Result<f32, String> {
 }
 
 impl ViewArgs {
-    /// The scene of a sheet of this size in metres, in a picture so much wider than high.
+    /// The view of a sheet of this size in metres, under this light from everywhere.
     ///
     /// # Errors
-    /// A scene that cannot be seen, or a place to look at that is not on the sheet or turned away.
-    pub fn scene(&self, size: [f64; 2], aspect: f64, probe: Option<Probe>) -> Result<Scene> {
-        let lamp = |Lamp(Degrees(azimuth, elevation), distance): Lamp| {
-            let towards = direction(azimuth, elevation);
-            distance.map_or(Light::Far(towards), |d| Light::Near(towards.map(|c| c * d)))
-        };
-        let pose = Pose { turn: self.tilt.0.to_radians(), tip: self.tilt.1.to_radians(), curl: self.curl };
-        let whole = Camera::whole(direction(self.view.0, self.view.1), self.distance.0, size, aspect);
-        let lights = self.lamps().into_iter().map(lamp).collect();
-        let mut scene = Scene { camera: whole, pose, lights, probe };
-        scene.check(size)?;
-        scene.camera = whole.zoomed(self.zoom, self.place(size)?, &pose)?;
-        Ok(scene)
+    /// A place to look at that is not on the sheet.
+    pub fn view(&self, size: [f64; 2], probe: Option<Probe>) -> Result<View> {
+        let degrees = |Degrees(azimuth, elevation): Degrees| [azimuth, elevation];
+        Ok(View {
+            show: self.show,
+            lights: self.light.iter().map(|&Lamp(angles, distance)| (degrees(angles), distance)).collect(),
+            probe,
+            eye: degrees(self.view),
+            distance: self.distance.0,
+            zoom: self.zoom,
+            middle: self.place(size)?,
+            tilt: degrees(self.tilt),
+            curl: self.curl,
+            exposure: self.exposure,
+            knee: self.tone_curve,
+        })
     }
 
     /// The place in the middle of the picture, in metres right and up of the middle of a sheet of this size.
@@ -222,29 +196,6 @@ impl ViewArgs {
         self.zoom != 1.0 || self.middle.is_some()
     }
 
-    /// What a picture shows.
-    pub fn what(&self) -> Show {
-        self.show.unwrap_or(Show::Printed)
-    }
-
-    /// The tone curve with the exposure asked for, or with one for this picture.
-    pub fn tone(&self, radiance: &Radiance) -> ToneCurve {
-        let tone = match self.exposure {
-            Some(stops) => ToneCurve::stops(f64::from(stops)),
-            None if self.light_probe.is_some() => ToneCurve::under_a_probe(std::slice::from_ref(radiance)),
-            None => ToneCurve::of(std::slice::from_ref(radiance)),
-        };
-        ToneCurve { knee: self.tone_curve, ..tone }
-    }
-
-    /// The lights named; without any and without a probe, one.
-    fn lamps(&self) -> Vec<Lamp> {
-        if self.light.is_empty() && self.light_probe.is_none() {
-            return vec![Lamp(Degrees(-25.0, 30.0), Some(0.6))];
-        }
-        self.light.clone()
-    }
-
     /// Whether there are options that only light needs.
     pub fn has_lights(&self) -> bool {
         !self.light.is_empty() || self.light_probe.is_some() || self.has_tone()
@@ -253,39 +204,6 @@ impl ViewArgs {
     /// Whether there are options of the tone curve.
     pub fn has_tone(&self) -> bool {
         self.exposure.is_some() || self.tone_curve != ToneCurve::PAPER.knee
-    }
-
-    /// The same scene as the page's address holds it.
-    pub fn fragment(&self, camera: &Camera, tone: ToneCurve, both: bool, probe: bool) -> String {
-        // A tenth of a micrometre.
-        let [right, up] = camera.middle.map(|m| (m * 1e7).round() / 1e7);
-        let lamp = |Lamp(Degrees(a, e), distance): &Lamp| format!("{a},{e},{}", distance.unwrap_or(0.0));
-        let lights: Vec<String> = self.lamps().iter().map(lamp).collect();
-        let name = |show| match show {
-            Show::Document => "document",
-            Show::Mapped => "mapped",
-            Show::Printed => "printed",
-        };
-        // Unless one thing was asked for, the document stands beside its print.
-        let shows = match (self.show, both) {
-            (None, true) => "show=document&with=printed&split=0.5".to_owned(),
-            _ => format!("show={}", name(self.what())),
-        };
-        format!(
-            "{shows}&light={}&probe={}&view={},{}&distance={}&tilt={},{}&curl={}&zoom={}&pan={right},{up}\
-             &exposure={:.2}&knee={}",
-            lights.join(";"),
-            u8::from(probe),
-            self.view.0,
-            self.view.1,
-            self.distance.0.unwrap_or(0.0),
-            self.tilt.0,
-            self.tilt.1,
-            self.curl.unwrap_or(0.0),
-            self.zoom,
-            tone.in_stops(),
-            tone.knee,
-        )
     }
 }
 
@@ -306,9 +224,9 @@ mod tests {
     fn a_page_opens_with_the_same_part_of_the_sheet() {
         let view = |words: &str| Command::parse_from(format!("preview {words}").split(' ')).view;
         let at = |words: &str| {
-            let view = view(words);
-            let camera = view.scene([0.1, 0.08], 1.25, None).unwrap().camera;
-            let fragment = view.fragment(&camera, ToneCurve::PAPER, false, false);
+            let view = view(words).view([0.1, 0.08], None).unwrap();
+            let camera = view.scene([0.1, 0.08], 1.25).unwrap().camera;
+            let fragment = view.fragment(&camera, ToneCurve::PAPER, false);
             let value = |key: &str| {
                 let (_, rest) = fragment.split_once(&format!("&{key}=")).unwrap();
                 rest.split('&').next().unwrap().to_owned()
@@ -323,7 +241,7 @@ mod tests {
         assert_eq!(pan, format!("{},0.01", (-0.03 * 30f64.to_radians().cos() * 1e7).round() / 1e7));
         let (zoom, pan, _) = at("--tilt 30,0");
         assert_eq!((zoom.as_str(), pan.as_str()), ("1", "0,0"));
-        let refused = view("--middle 101x30mm").scene([0.1, 0.08], 1.25, None).unwrap_err().to_string();
+        let refused = view("--middle 101x30mm").view([0.1, 0.08], None).unwrap_err().to_string();
         assert!(refused.contains("not on the sheet, which is 100.0 x 80.0 mm"), "{refused}");
         for text in ["0", "401", "NaN", "x"] {
             assert!(super::zoom(text).unwrap_err().contains("from 0.5 to 400"), "{text}");

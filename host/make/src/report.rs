@@ -7,7 +7,6 @@
 use maths::Maths;
 use std::fmt::{self, Write as _};
 
-use anyhow::Result;
 use appearance::brdf::{Space, plot};
 use appearance::gamut::{DistanceUncertainty, MaterialReport};
 use halftone::metrics::{Look, Tone};
@@ -15,6 +14,8 @@ use press::html::{self, escape};
 use press::job::plan::{Plan, grouped};
 use press::preview::gloss::{self, Gloss};
 use press::preview::{Contrasts, FidelityReport, Spectrum, mix_in_words};
+
+use crate::Error;
 
 /// Materials whose curves are drawn: those that stand for most of the document.
 const DRAWN: usize = 8;
@@ -58,7 +59,7 @@ pub struct Subject<'a> {
 ///
 /// # Errors
 /// A plot that cannot be drawn: a bug if it is ever seen.
-pub fn page(subject: &Subject) -> Result<String> {
+pub fn page(subject: &Subject) -> Result<String, Error> {
     let plots = drawn(subject.materials)
         .into_iter()
         .map(|i| {
@@ -68,7 +69,7 @@ pub fn page(subject: &Subject) -> Result<String> {
             let title = format!("{} {i}: d = {:.3}", subject.kind, material.distance);
             Ok((i, plot::compared(&title, &lines)?))
         })
-        .collect::<Result<Vec<(usize, String)>>>()?;
+        .collect::<Result<Vec<(usize, String)>, Error>>()?;
     let mut body = String::new();
     write(subject, &plots, &mut body)?;
     Ok(html::read(&format!("{}: report of the print", subject.plan.document), STYLE, &body))

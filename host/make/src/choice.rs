@@ -1,0 +1,183 @@
+//! Names and words of what can be chosen: for the options of a command line, for reports, and for dialogs.
+
+use appearance::document::ColourSpace;
+use appearance::factor::Method;
+use appearance::gamut::{self, Intent};
+use art::{Accept, Finish, White};
+use inks::Trust;
+
+use crate::view::Show;
+
+/// An enum whose values have names.
+pub trait Choice: Copy + Send + Sync + 'static {
+    /// Each value with its name and a line of help, which may be empty.
+    const ALL: &'static [(Self, &'static str, &'static str)];
+}
+
+/// The name of a value.
+#[must_use]
+pub fn name<T: Choice + PartialEq>(value: T) -> &'static str {
+    T::ALL.iter().find(|(known, ..)| *known == value).map_or("", |(_, name, _)| name)
+}
+
+impl Choice for ColourSpace {
+    const ALL: &'static [(ColourSpace, &'static str, &'static str)] = &[
+        (ColourSpace::Srgb, "srgb", "The transfer curve of IEC 61966-2-1"),
+        (ColourSpace::Linear, "linear", "Proportional to reflectance"),
+    ];
+}
+
+impl Choice for Method {
+    const ALL: &'static [(Method, &'static str, &'static str)] = &[
+        (
+            Method::Archetypes,
+            "archetypes",
+            "Corners of the document, fitted in the metric, kept near its real materials",
+        ),
+        (
+            Method::Kmeans,
+            "kmeans",
+            "The paper's convex-hull k-means: real materials, robust, but inside the corners",
+        ),
+        (
+            Method::Sacls,
+            "sacls",
+            "The paper's sparse alternating constrained least squares; kmeans where its bases are far from any real material",
+        ),
+    ];
+}
+
+/// What mixtures are chosen by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Metric {
+    /// Distance d and the distance in light.
+    Light,
+    /// Distance d alone.
+    Paper,
+}
+
+impl Metric {
+    /// The weight of the distance in light.
+    #[must_use]
+    pub fn light(self) -> f64 {
+        match self {
+            Metric::Light => gamut::LIGHT,
+            Metric::Paper => 0.0,
+        }
+    }
+}
+
+impl Choice for Metric {
+    const ALL: &'static [(Metric, &'static str, &'static str)] = &[
+        (Metric::Light, "light", "Distance d and how much light is returned: metals shine"),
+        (Metric::Paper, "paper", "Distance d alone, as in the 2009 paper"),
+    ];
+}
+
+impl Choice for Trust {
+    const ALL: &'static [(Trust, &'static str, &'static str)] = &[
+        (Trust::All, "all", "Every curve of the library, modelled ones too"),
+        (Trust::Predicted, "predicted", "Curves that were measured, and those predicted from measurements"),
+        (Trust::Measured, "measured", "Curves that were measured, and no others"),
+    ];
+}
+
+impl Choice for Intent {
+    const ALL: &'static [(Intent, &'static str, &'static str)] = &[
+        (
+            Intent::Auto,
+            "auto",
+            "Clamp, unless that merges more than 1 % of pairs of materials that differ and blend merges clearly fewer",
+        ),
+        (Intent::Basis, "basis", "Map the bases and keep the weights: relative differences survive"),
+        (
+            Intent::Clamp,
+            "clamp",
+            "Map each pixel by itself: lowest error, but differences outside the gamut are lost",
+        ),
+        (Intent::Blend, "blend", "Clamp where the result is near, use the mapped bases where it is not"),
+        (
+            Intent::Contrast,
+            "contrast",
+            "Clamp what the inks can make; elsewhere keep differences between neighbours, such as scratches and grain",
+        ),
+    ];
+}
+
+impl Choice for halftone::Method {
+    const ALL: &'static [(halftone::Method, &'static str, &'static str)] = &[
+        (halftone::Method::Walk, "walk", "Runs along a space-filling curve: the paper's rule"),
+        (halftone::Method::Cells, "cells", "Compact clusters, no part thinner than its ink holds"),
+        (halftone::Method::Best, "best", "Cells, rearranged to lessen the error the eye sees; slower"),
+        (halftone::Method::Blue, "blue", "Single scattered dots (blue noise); for process inks alone"),
+        (
+            halftone::Method::Fine,
+            "fine",
+            "Small clusters that each dot picks from a table; for process inks alone",
+        ),
+    ];
+}
+
+impl Choice for art::Intent {
+    const ALL: &'static [(art::Intent, &'static str, &'static str)] = &[
+        (
+            art::Intent::Auto,
+            "auto",
+            "Perceptual for pictures, colorimetric for text and drawings; tints of cyan, magenta, yellow, red, green and blue keep those inks there",
+        ),
+        (
+            art::Intent::Perceptual,
+            "perceptual",
+            "Saturated colours move closer together, and differences between them survive",
+        ),
+        (
+            art::Intent::Colorimetric,
+            "colorimetric",
+            "Printable colours are kept; others become the nearest printable colour of their hue",
+        ),
+    ];
+}
+
+impl Choice for White {
+    const ALL: &'static [(White, &'static str, &'static str)] = &[
+        (White::None, "none", "No white at all, not even where the art draws it"),
+        (White::Under, "under", "Under every dot of every ink"),
+        (White::Reserved, "reserved", "Where the picture has the vendor's reserved white, 230,230,230"),
+        (White::Opaque, "opaque", "Where the picture is neither pure white nor transparent"),
+        (White::Silhouette, "silhouette", "Everything inside the outline, including holes and white areas"),
+        (White::Alpha, "alpha", "Where the picture is not transparent, including pure white"),
+    ];
+}
+
+impl Choice for art::Text {
+    const ALL: &'static [(art::Text, &'static str, &'static str)] = &[
+        (art::Text::Mixed, "mixed", "In its colour, mixed dot by dot like everything else"),
+        (art::Text::Solid, "solid", "In the nearest solid, if one looks about like its colour: for labels"),
+    ];
+}
+
+impl Choice for Finish {
+    const ALL: &'static [(Finish, &'static str, &'static str)] = &[
+        (Finish::Artwork, "artwork", "On everything that is drawn"),
+        (Finish::All, "all", "On the whole rectangle of the artwork"),
+        (Finish::None, "none", "Nowhere, not even where the artwork draws it"),
+    ];
+}
+
+impl Choice for Accept {
+    const ALL: &'static [(Accept, &'static str, &'static str)] = &[
+        (Accept::FoilUndercoat, "foil-undercoat", "Solid cyan, magenta, yellow and black beneath every foil"),
+        (Accept::EvenWhite, "even-white", "Primer, finish and primer between black and the white above it"),
+        (Accept::WhiteThrice, "white-thrice", "Three layers of white instead of one"),
+        (Accept::SilverUnderWhite, "silver-under-white", "Metallic silver beneath white, for dark grounds"),
+        (Accept::WhiteKept, "white-kept", "White beneath the colours of a page that knock it out"),
+    ];
+}
+
+impl Choice for Show {
+    const ALL: &'static [(Show, &'static str, &'static str)] = &[
+        (Show::Document, "document", "The document itself"),
+        (Show::Mapped, "mapped", "The mixtures of inks that stand for it"),
+        (Show::Printed, "printed", "The printed dots"),
+    ];
+}

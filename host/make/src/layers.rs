@@ -1,0 +1,140 @@
+//! Flat art to its print: what the command line, print queues and the print server do alike.
+//!
+//! Method: [`Layers::open`] reads the art for the room that its page has, [`Layers::compose`] makes its dots, and job, plan and pictures are
+//! made of these. Cost and limits: those of [`art`].
+
+use std::path::PathBuf;
+
+use art::{Artwork, Composed, Remedy, Room};
+use inks::{InkSet, Library};
+use observe::Observer;
+use press::job::plan::Suggestion;
+use press::layout;
+use press::pipeline::{self, Draft, Job, Request};
+
+use crate::made::{Made, Subject};
+use crate::{Error, PageSettings};
+
+/// How flat art is printed.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// How it is read. The room that its page has is known to [`page`](Self::page).
+    pub read: art::Options,
+    /// How its layers become stacks.
+    pub compose: art::Settings,
+    /// The ink library.
+    pub library: Library,
+    /// How it lies on the paper.
+    pub page: PageSettings,
+    /// How to ask for what would improve the print, in the words of whoever shows the plan; of the inks that may be used.
+    pub how: fn(&Remedy, &InkSet) -> String,
+}
+
+impl Default for Settings {
+    /// As drawn, in all inks but the foils, in the middle of A4.
+    fn default() -> Settings {
+        Settings {
+            read: art::Options::default(),
+            compose: art::Settings::default(),
+            library: Library::builtin(),
+            page: PageSettings::default(),
+            how: |_, _| String::new(),
+        }
+    }
+}
+
+/// Art as dots, and everything that decides its print.
+pub struct Layers<'a> {
+    name: &'a str,
+    settings: &'a Settings,
+    /// The dots, what was laid, and what would improve it.
+    pub composed: Composed,
+}
+
+impl<'a> Layers<'a> {
+    /// The job of art in files, proved on the simulated printer, with its plan.
+    ///
+    /// # Errors
+    /// Those of [`art`], a layout without room, and rules that forbid the job.
+    pub fn of(files: &[PathBuf], settings: &Settings, observer: &dyn Observer) -> Result<Made, Error> {
+        let art = Layers::open(files, settings, observer)?;
+        Layers::compose(&art, settings, observer)?.made(observer)
+    }
+
+    /// Reads art for its page.
+    ///
+    /// # Errors
+    /// Those of [`art::open`], and a page on which it has no room.
+    pub fn open(files: &[PathBuf], settings: &Settings, observer: &dyn Observer) -> Result<Artwork, Error> {
+        let layout = &settings.page.layout;
+        let (width, length) = layout.largest();
+        let across = layout.resolution.across(1);
+        let room = Room { width, length, cut: layout.cut };
+        let art = art::open(
+            files,
+            &art::Options { across: across.into(), room, ..settings.read.clone() },
+            observer,
+        )?;
+        // Before the long work.
+        layout::check(art.width / usize::from(across), art.length, layout)
+            .map_err(pipeline::JobError::from)?;
+        Ok(art)
+    }
+
+    /// The dots of art.
+    ///
+    /// # Errors
+    /// Those of [`art::compose`](art::compose()).
+    pub fn compose(
+        art: &'a Artwork,
+        settings: &'a Settings,
+        observer: &dyn Observer,
+    ) -> Result<Layers<'a>, Error> {
+        let composed = art::compose(art, &settings.compose, &settings.library, observer)?;
+        Ok(Layers { name: &art.name, settings, composed })
+    }
+
+    /// The page, its passes and its plan. What must not be printed is planned, too.
+    ///
+    /// # Errors
+    /// A layout without room.
+    pub fn draft(&self, observer: &dyn Observer) -> Result<Draft, Error> {
+        let mut draft = pipeline::draft(&self.request(), observer)?;
+        draft.plan.notes.clone_from(&self.composed.report.notes);
+        draft.plan.suggestions = self.suggestions();
+        Ok(draft)
+    }
+
+    /// The job, not proved: for whoever sends it at once.
+    ///
+    /// # Errors
+    /// A layout without room, and rules that forbid the job.
+    pub fn job(&self, observer: &dyn Observer) -> Result<Job, Error> {
+        Ok(pipeline::job(&self.request(), observer)?)
+    }
+
+    /// The job, proved on the simulated printer.
+    ///
+    /// # Errors
+    /// A layout without room, and rules that forbid the job.
+    pub fn made(self, observer: &dyn Observer) -> Result<Made, Error> {
+        let mut made = Made::proved(&self.request(), &self.settings.page, observer)?;
+        made.job.draft.plan.suggestions = self.suggestions();
+        made.job.draft.plan.notes.clone_from(&self.composed.report.notes);
+        Ok(made.of(Subject::Layers(Box::new(self.composed.report))))
+    }
+
+    fn request(&self) -> Request<'_> {
+        let Settings { compose, library, page, .. } = self.settings;
+        page.request(self.name, &self.composed.dots, compose.inks, library)
+    }
+
+    fn suggestions(&self) -> Vec<Suggestion> {
+        let of = |art::Suggestion { text, remedy, dots }: &art::Suggestion| Suggestion {
+            text: text.clone(),
+            how: (self.settings.how)(remedy, &self.settings.compose.inks),
+            dots: *dots,
+        };
+        self.composed.suggestions.iter().map(of).collect()
+    }
+}
