@@ -28,7 +28,7 @@ use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Ima
 pub use chunks::{MOST_PROFILE, gamma};
 pub use exif::{Exif, exif};
 pub use exr::Primaries;
-pub use pixels::{Kind, Pixels, open_exr, png};
+pub use pixels::{Pixel, Pixels, open_exr, png};
 pub use stored::{Fault, Format, Header, Samples, Stored};
 
 /// The format of a file by its first bytes; Targa files, which have no signature, by the ending of their

@@ -67,7 +67,7 @@ impl Pixels<[u8; 3]> {
     /// # Errors
     /// A raster without pixels.
     pub fn png(&self) -> io::Result<Vec<u8>> {
-        png(self.pixels.as_flattened(), self.size, Kind::Rgb)
+        png(self.pixels.as_flattened(), self.size, Pixel::Rgb)
     }
 
     /// The bytes of a JPEG; `quality` is 1 to 100.
@@ -90,13 +90,13 @@ impl Pixels<u8> {
     /// # Errors
     /// A raster without pixels.
     pub fn png(&self) -> io::Result<Vec<u8>> {
-        png(&self.pixels, self.size, Kind::Grey)
+        png(&self.pixels, self.size, Pixel::Grey)
     }
 }
 
 /// What the samples of a PNG are.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Kind {
+pub enum Pixel {
     /// A byte a pixel.
     Grey,
     /// Two bytes a pixel, in the order of this computer's bytes.
@@ -109,11 +109,11 @@ pub enum Kind {
 ///
 /// # Errors
 /// A picture without pixels, or a number of samples that differs from its size.
-pub fn png(samples: &[u8], size: (u32, u32), kind: Kind) -> io::Result<Vec<u8>> {
+pub fn png(samples: &[u8], size: (u32, u32), kind: Pixel) -> io::Result<Vec<u8>> {
     let (colour, each) = match kind {
-        Kind::Grey => (ExtendedColorType::L8, 1),
-        Kind::Grey16 => (ExtendedColorType::L16, 2),
-        Kind::Rgb => (ExtendedColorType::Rgb8, 3),
+        Pixel::Grey => (ExtendedColorType::L8, 1),
+        Pixel::Grey16 => (ExtendedColorType::L16, 2),
+        Pixel::Rgb => (ExtendedColorType::Rgb8, 3),
     };
     if u64::from(size.0) * u64::from(size.1) * each != samples.len() as u64 {
         return Err(io::Error::other(format!("{} bytes for {size:?} pixels of {each}", samples.len())));
@@ -179,6 +179,6 @@ mod tests {
         *raster.at_mut(1, 0).unwrap() = 9;
         assert_eq!((raster.at(1, 0), raster.at(0, 1)), (9, 7));
         assert!(Pixels::filled(0, 2, 7u8).png().is_err());
-        assert!(png(&[0; 5], (2, 3), Kind::Grey).is_err());
+        assert!(png(&[0; 5], (2, 3), Pixel::Grey).is_err());
     }
 }

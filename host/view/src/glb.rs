@@ -87,7 +87,7 @@ pub fn glb(lit: &Lit, space: &Space, name: &str, observer: &dyn Observer) -> Res
     let texture = |texel: &dyn Fn(&Texel) -> [u8; 3]| {
         let bytes: Vec<u8> = texels.iter().flat_map(texel).collect();
         let size = (level.width as u32, level.height as u32);
-        readers::png(&bytes, size, readers::Kind::Rgb)
+        readers::png(&bytes, size, readers::Pixel::Rgb)
     };
     // Red is free; occlusion, which some programs expect there, is none.
     let surfaces = texture(&|texel| [255, texel.roughness, texel.metallic])?;

@@ -122,7 +122,7 @@ pub fn write(
         }
         let at = inside.join(&file);
         let mut output = std::fs::File::create_new(&at).map_err(io(&at, "write"))?;
-        let picture = readers::png(&row, (width as u32, height as u32), readers::Kind::Grey16)
+        let picture = readers::png(&row, (width as u32, height as u32), readers::Pixel::Grey16)
             .map_err(io(&at, "write"))?;
         output.write_all(&picture).map_err(io(&at, "write"))?;
         maps.push(file);

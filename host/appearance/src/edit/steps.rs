@@ -236,7 +236,7 @@ fn write_mask(painted: &Painted, at: &Path) -> Result<(), DocumentError> {
     let mut output = std::fs::File::create_new(at).map_err(io)?;
     let greys: Vec<u8> = painted.values.iter().flat_map(|&w| to_grey(w).to_ne_bytes()).collect();
     let size = (painted.width as u32, painted.height as u32);
-    let picture = readers::png(&greys, size, readers::Kind::Grey16).map_err(io)?;
+    let picture = readers::png(&greys, size, readers::Pixel::Grey16).map_err(io)?;
     output.write_all(&picture).map_err(io)
 }
 

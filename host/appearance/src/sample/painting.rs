@@ -1,6 +1,6 @@
 //! The maps of a sample, and the surfaces they define.
 
-use readers::Kind;
+use readers::Pixel;
 
 use crate::brdf::Space;
 use crate::materials::{Surfaces, dielectric, metallic, specular};
@@ -42,8 +42,8 @@ pub(crate) struct Painting {
 
 impl Painting {
     /// The files of the painting: name, samples and their kind.
-    pub fn maps(&self) -> Vec<(&'static str, Vec<u8>, Kind)> {
-        let (grey, rgb) = (Kind::Grey, Kind::Rgb);
+    pub fn maps(&self) -> Vec<(&'static str, Vec<u8>, Pixel)> {
+        let (grey, rgb) = (Pixel::Grey, Pixel::Rgb);
         match &self.finish {
             Finish::Metallic { roughness, metallic } => vec![
                 ("base_color.png", self.base.concat(), rgb),

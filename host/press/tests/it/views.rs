@@ -35,7 +35,7 @@ fn write(path: &Path, (width, height): (usize, usize), drawing: Drawing) {
     let pixels = (0..width * height).map(|i| drawing(i % width, i / width));
     let bytes: Vec<u8> = pixels.map(|v| (255.0 * appearance::srgb::encode(v as f32)).round() as u8).collect();
     let size = (width as u32, height as u32);
-    std::fs::write(path, readers::png(&bytes, size, readers::Kind::Grey).unwrap()).unwrap();
+    std::fs::write(path, readers::png(&bytes, size, readers::Pixel::Grey).unwrap()).unwrap();
 }
 
 /// The document of two drawings for these inks.
