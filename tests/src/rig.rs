@@ -231,7 +231,16 @@ pub fn play(scenario: &Scenario, rig: &mut Rig, bridge: &Bridge<'_>) -> io::Resu
     if !scenario.id.is_empty() {
         // A printer that did not negotiate before is asked again only when it has been switched off.
         rig.tell(&Order::Power(false))?;
-        std::thread::sleep(Duration::from_secs(1));
+        let start = Instant::now();
+        loop {
+            let output = bridge.command(&["bridge", "status", "--to", bridge.address]).output()?;
+            if String::from_utf8_lossy(&output.stdout).contains("+5 V absent") {
+                break;
+            }
+            if start.elapsed() > PATIENCE {
+                return Err(wrong("the bridge does not see that the printer is off".into()));
+            }
+        }
     }
     rig.tell(&Order::Begin { work_ns: scenario.work_ns, bytes: first })?;
     if scenario.ends == End::Asked {

@@ -16,8 +16,11 @@ use device::connection::transport::{Socket, Transport};
 use press::simulate::{Carousel, Cartridge, Lever, Printer, STATUS_LENGTH, Trouble};
 use protocol::ink::Ink;
 use protocol::link::frame::{MAX, Reader};
-use protocol::link::message::{Answer, Fault, JobState, Lines, Usage};
+use protocol::link::message::{Answer, Fault, JobState, Lines, Progress, Usage};
 use protocol::runs::Decoder;
+
+/// Enough for anything the bridge does at once, on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// How long the printer prints behind the last byte.
 const PRINTS: Duration = Duration::from_secs(1);
@@ -54,7 +57,7 @@ pub struct Port {
     /// How many bytes had crossed the port at each reset.
     pub reset_at: Mutex<Vec<usize>>,
     /// Where the bridge's job stands.
-    pub state: Mutex<JobState>,
+    progress: Mutex<Option<Progress>>,
     /// The link is cut.
     pub cut: AtomicBool,
     /// Something that is no message comes out of the link at both ends.
@@ -91,7 +94,7 @@ impl Port {
             asked: 0.into(),
             resets: 0.into(),
             reset_at: Mutex::default(),
-            state: Mutex::new(JobState::None),
+            progress: Mutex::default(),
             cut: false.into(),
             garbage: false.into(),
             forget: false.into(),
@@ -107,6 +110,11 @@ impl Port {
     /// The same at a bridge with so much memory for bands.
     pub fn with_band(self, band: usize) -> Port {
         Port { band, ..self }
+    }
+
+    /// Where the bridge's job stands; none before the bridge is up.
+    pub fn progress(&self) -> Option<Progress> {
+        *self.progress.lock().expect("no test panicked with it")
     }
 
     /// Bytes of the flash that are written.
@@ -221,6 +229,24 @@ impl Bridge {
         Bridge { port, thread: Some(thread) }
     }
 
+    /// Does one of the things that happen once, such as a restart, and waits until it has happened.
+    ///
+    /// # Panics
+    /// If it never does.
+    pub fn strike(&self, flag: impl Fn(&Port) -> &AtomicBool) {
+        flag(&self.port).store(true, Ordering::Relaxed);
+        let start = Instant::now();
+        while is(flag(&self.port)) {
+            assert!(start.elapsed() < PATIENCE, "the bridge takes no notice");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// The state of its job.
+    pub fn state(&self) -> JobState {
+        self.port.progress().map_or(JobState::None, |progress| progress.state)
+    }
+
     /// Everything that has crossed the port.
     pub fn printed(&self) -> Vec<u8> {
         self.port.printed.lock().expect("no test panicked with it").clone()
@@ -310,7 +336,7 @@ fn serve(
             (false, true) => (Lines::IDLE, None),
         };
         engine.port(lines, fault);
-        *port.state.lock().expect("no test panicked with it") = engine.progress().state;
+        *port.progress.lock().expect("no test panicked with it") = Some(engine.progress());
         let bytes = engine.output();
         let mut printed = port.printed.lock().expect("no test panicked with it");
         let waits = fault.is_some() || is(&port.busy) && !printed.is_empty();

@@ -1,9 +1,12 @@
 //! `cargo xtask test`: everything that has to pass before anything lands.
 //!
-//! Every step runs, whatever failed before, and has its time said. What the tests need is fetched and built beside the lints, for much
-//! of that is waiting; the tests then run together, those on the emulator and in the browser beside the others. At the end
-//! stand the seconds of each step, the slowest tests, the tests that were left out because something is missing on this computer
-//! ([`needs`]), and the steps that failed.
+//! Problem: everybody waits for it, and whole programs in real time take longer than all else together.
+//! Method: every step runs, whatever failed before, and has its time said. What the tests need is fetched and built beside
+//! the lints, for much of that is waiting; the tests then run together, those on the emulator and in the browser beside the
+//! others. Tests that take real time are marked `#[ignore]` with the reason `real time`: they are built like the
+//! others, and `--full` runs them, too, with the lints for other systems and the Debian package.
+//! At the end stand the seconds of each step, the slowest tests, the tests that were left out because something is missing on
+//! this computer ([`needs`]), and the steps that failed.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -82,7 +85,9 @@ pub fn run(root: &Path, is_full: bool) -> ExitCode {
                 "warnings",
             ]))
         });
-        gate.step("lints for macOS and Windows", || foreign::lint(root));
+        if is_full {
+            gate.step("lints for macOS and Windows", || foreign::lint(root));
+        }
         gate.step("documentation", || {
             let mut doc = cargo(&["doc", "--workspace", "--no-deps", "--locked"]);
             succeed(doc.env("RUSTDOCFLAGS", "-D warnings"))
@@ -95,7 +100,7 @@ pub fn run(root: &Path, is_full: bool) -> ExitCode {
     let summary = gate.step("tests", || runner.all());
     gate.step("examples of the documentation", || runner::documentation(root));
     // The package is tried with the tests of print queues: where they fail, it would.
-    if gate.failed().is_empty() {
+    if is_full && gate.failed().is_empty() {
         gate.step("package", || package::run_where_possible(root, &runner.program()));
     }
     report(&gate, &runner.slowest(), summary.as_deref(), &repeat);

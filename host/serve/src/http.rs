@@ -37,6 +37,7 @@ use crate::operations::{self, Place};
 use crate::server::Server;
 use crate::spool::{Kind, Packing, Spool, SpoolError};
 use crate::tls::{self, HANDSHAKE};
+use crate::values::now;
 use crate::wire;
 
 /// What clients may take.
@@ -133,7 +134,9 @@ pub fn run(server: &Arc<Server>, listeners: Vec<std::net::TcpListener>, limits: 
         }
         loop {
             tokio::time::sleep(TICK).await;
-            block_in_place(|| server.time_out(crate::printer::TIME_OUT.unsigned_abs().into()));
+            block_in_place(|| {
+                server.time_out(now().saturating_sub(crate::printer::TIME_OUT.unsigned_abs().into()))
+            });
         }
     })
 }

@@ -414,14 +414,14 @@ impl Server {
         }
     }
 
-    /// Ends jobs whose document has not begun to come within this time.
-    pub fn time_out(&self, seconds: u64) {
+    /// Ends jobs that have waited for their document since before this time, in seconds since 1970.
+    pub fn time_out(&self, since: u64) {
         let late: Vec<u32> = {
             let mut data = self.data();
             let Data { jobs, heard, .. } = &mut *data;
             heard.retain(|id, _| jobs.get(id).is_some_and(|job| job.state == State::Incoming));
             let last = |job: &Job| heard.get(&job.id).copied().unwrap_or(Some(job.created));
-            let late = |job: &&Job| last(job).is_some_and(|last| last + seconds < now());
+            let late = |job: &&Job| last(job).is_some_and(|last| last < since);
             let incoming = jobs.values().filter(|job| job.state == State::Incoming);
             incoming.filter(late).map(|job| job.id).collect()
         };

@@ -10,6 +10,7 @@ use testing::needs;
 use testing::program::{Bench, small_document};
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn pages_work_in_a_browser() {
     let Some(browser) = Browser::find() else { return };
     let bench = Bench::new();
@@ -26,6 +27,7 @@ fn pages_work_in_a_browser() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn pages_of_inks_work_in_a_browser() {
     let (Some(browser), Some(data)) = (Browser::find(), needs::data()) else { return };
     let bench = Bench::new();
@@ -50,6 +52,7 @@ fn pages_of_inks_work_in_a_browser() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_comparison_works_in_a_browser() {
     let Some(browser) = Browser::find() else { return };
     let bench = Bench::new();

@@ -131,9 +131,9 @@ fn packed(kind: Kind, pixels: Vec<Vec<u8>>) -> Vec<u8> {
     row
 }
 
-/// Writes the samples that `ipp-everywhere.test` asks for into a folder, under its names: those at `drawn` resolutions with pages in
-/// them, those at others empty. Returns their number.
-pub fn samples(folder: &std::path::Path, drawn: &[u32], others: &[u32]) -> usize {
+/// Writes the samples that `ipp-everywhere.test` asks for at these resolutions into a folder, under its names. Returns their
+/// number.
+pub fn samples(folder: &std::path::Path, resolutions: &[u32]) -> usize {
     let mut count = 0;
     // Two tenths of an inch of each colour across the page, an inch below its top.
     let drawing = |dpi: u32, grey: bool| {
@@ -148,7 +148,7 @@ pub fn samples(folder: &std::path::Path, drawn: &[u32], others: &[u32]) -> usize
             _ => [255; 3],
         }
     };
-    for &dpi in drawn.iter().chain(others) {
+    for &dpi in resolutions {
         let (a4, letter, index) =
             ((dpi * 827 / 100, dpi * 1169 / 100), (dpi * 85 / 10, dpi * 11), (dpi * 4, dpi * 6));
         for (kind, name) in Kind::ALL {
@@ -165,10 +165,7 @@ pub fn samples(folder: &std::path::Path, drawn: &[u32], others: &[u32]) -> usize
             ] {
                 let page: &dyn Fn(u32, u32) -> [u8; 3] =
                     if file.starts_with("gray") { &grey } else { &colour };
-                let document = match drawn.contains(&dpi) {
-                    true => document(kind, dpi, size, dpi / 10, &vec![page; pages]),
-                    false => Vec::new(),
-                };
+                let document = document(kind, dpi, size, dpi / 10, &vec![page; pages]);
                 std::fs::write(into.join(format!("{file}-{name}-{dpi}dpi.pwg")), document).expect("a file");
                 count += 1;
             }

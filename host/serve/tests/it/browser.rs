@@ -6,6 +6,7 @@ use testing::browser::Browser;
 use super::Running;
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn the_desk_works_in_a_browser() {
     let Some(browser) = Browser::find() else { return };
     let running = Running::start(Limits::default(), true);

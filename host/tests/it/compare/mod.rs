@@ -40,6 +40,7 @@ fn vector(value: &Value) -> V {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn poses_and_errors_are_the_true_ones() {
     let bench = bench(&names());
     let said = bench.done(&format!("compare photos {PRINT} --job job.rgl --camera camera.toml --json"));
@@ -118,6 +119,7 @@ fn poses_and_errors_are_the_true_ones() {
 
 /// A print that is as predicted does not differ from its prediction, and one ink that is a tenth darker is found with its uncertainty.
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn what_is_as_predicted_does_not_differ() {
     let bench = bench(&[]);
     let shots = [&SHOTS[0], &SHOTS[3]];
@@ -167,6 +169,7 @@ fn what_is_as_predicted_does_not_differ() {
 
 /// A lens out of focus carries light of bright stacks to dark ones, and a pass that lies beside its place bares and doubles them: neither is an ink's.
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn neither_focus_nor_register_is_taken_for_inks() {
     let bench = bench(&[]);
     let shots = [&SHOTS[0], &SHOTS[1]];

@@ -346,6 +346,7 @@ fn the_page_draws_what_the_renderer_draws_in_a_browser() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn every_control_does_what_it_says_in_a_browser() {
     let Some(browser) = Browser::find() else { return };
     let folder = tempfile::tempdir().unwrap();

@@ -10,6 +10,7 @@ use serde_json::Value;
 use super::{Bench, INKS, job, text};
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn the_log_tells_of_the_start_and_of_every_job_in_words() {
     let Some(bench) = Bench::new(&INKS.map(Cartridge::from)) else { return };
     let job = job();
@@ -49,6 +50,7 @@ fn the_log_tells_of_the_start_and_of_every_job_in_words() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn the_wiring_is_tried_in_every_position_of_the_plug_and_never_on_a_printer() {
     let Some(mut bench) = Bench::new(&INKS.map(Cartridge::from)) else { return };
     // A printer in place of the plug: not a byte, and no reset.
@@ -71,6 +73,7 @@ fn the_wiring_is_tried_in_every_position_of_the_plug_and_never_on_a_printer() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn what_is_watched_changes_when_the_printer_does() {
     let Some(bench) = Bench::new(&INKS.map(Cartridge::from)) else { return };
     let mut child = bench

@@ -309,6 +309,7 @@ fn end(mut child: Child) -> String {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn the_image_is_written_through_the_usb_library_and_the_board_restarted() {
     let Some(bench) = Bench::new() else { return };
     let listed = bench.foilpress(&["bridge", "list"]).output().unwrap();
@@ -318,6 +319,7 @@ fn the_image_is_written_through_the_usb_library_and_the_board_restarted() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_cable_pulled_while_flashing_is_told_and_the_same_command_does_it_again() {
     let Some(bench) = Bench::new() else { return };
     for requests in [3, 11, 60, 120] {

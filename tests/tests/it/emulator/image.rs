@@ -16,10 +16,11 @@ use protocol::runs::{self, Header, MAX_BAND, MAX_HEADER};
 use protocol::walk::{EDGE, Frame, Placed, Walk};
 
 macro_rules! scripts {
-    ($($name:ident),*) => {
+    ($($(#[$ignored:meta])? $name:ident),*) => {
         const SCRIPTS: &[&str] = &[$(stringify!($name)),*];
         $(
             #[test]
+            $(#[$ignored])?
             fn $name() {
                 run(stringify!($name));
             }
@@ -27,7 +28,26 @@ macro_rules! scripts {
     };
 }
 
-scripts!(alone, control, failure, faults, firmware, plain, restart, speed, windows, wiring);
+scripts!(
+    #[ignore = "real time: cargo xtask test --full"]
+    alone,
+    #[ignore = "real time: cargo xtask test --full"]
+    control,
+    #[ignore = "real time: cargo xtask test --full"]
+    failure,
+    #[ignore = "real time: cargo xtask test --full"]
+    faults,
+    firmware,
+    #[ignore = "real time: cargo xtask test --full"]
+    plain,
+    restart,
+    #[ignore = "real time: cargo xtask test --full"]
+    speed,
+    #[ignore = "real time: cargo xtask test --full"]
+    windows,
+    #[ignore = "real time: cargo xtask test --full"]
+    wiring
+);
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("emulator")

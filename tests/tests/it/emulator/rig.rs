@@ -8,6 +8,7 @@ use foilpress_tests::rig::{Bridge, Rig, dump, play, read, scenarios};
 use super::parts;
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn every_scenario_of_the_rig_goes_as_it_should() {
     let Some((image, program)) = parts() else { return };
     let rig_image =

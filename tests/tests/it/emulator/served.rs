@@ -9,6 +9,7 @@ use testing::ipp;
 
 /// A page by IPP crosses the port as the very bytes that the server makes for a file, and the job is completed when its sheet is out.
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_page_that_a_device_sends_crosses_the_port() {
     let Some(mut bench) = Bench::new(&[Cartridge::from(Ink::Black)]) else { return };
     let serve = |to: &str| {

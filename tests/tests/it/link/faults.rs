@@ -98,6 +98,7 @@ const TABLE: [(Fault, [&str; 5]); 12] = [
 ];
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn every_caller_meets_every_fault_and_the_printer_never_gets_half_a_job_and_then_another() {
     // Built before the clock of any run starts.
     program();
@@ -342,7 +343,10 @@ impl Bench {
             KilledBeforeTheFirstByte | KilledInARow => run.kill(),
             KilledAtTheEnd => {
                 // The bridge takes all of a job this small, and finishes the sheet by itself.
-                std::thread::sleep(Duration::from_millis(1000));
+                let all = device::forms::streams::of_bytes(&self.job(), &Silent).unwrap().len();
+                self.until("the bridge has all of it", &mut run, |bench, _| {
+                    bench.bridge.port.progress().is_some_and(|progress| progress.accepted as usize == all)
+                });
                 run.kill();
                 self.set(|port| &port.busy, false);
                 let start = Instant::now();
@@ -352,8 +356,7 @@ impl Bench {
             }
             KilledAndForgotten => {
                 run.kill();
-                self.set(|port| &port.forget, true);
-                std::thread::sleep(Duration::from_millis(300));
+                self.bridge.strike(|port| &port.forget);
             }
             BridgeForgets => {
                 self.set(|port| &port.forget, true);
@@ -368,8 +371,7 @@ impl Bench {
             Cancelled => run = self.cancel(run),
         }
         if fault == RestartBetweenSheets {
-            self.set(|port| &port.forget, true);
-            std::thread::sleep(Duration::from_millis(300));
+            self.bridge.strike(|port| &port.forget);
         }
         self.set(|port| &port.busy, false);
         self.set(|port| &port.off, false);
@@ -389,7 +391,7 @@ impl Bench {
         }
         // Before the printer goes on.
         self.until("the bridge hears of it", &mut run, |bench, _| {
-            matches!(*bench.bridge.port.state.lock().unwrap(), JobState::Cancelling | JobState::Cancelled)
+            matches!(bench.bridge.state(), JobState::Cancelling | JobState::Cancelled)
         });
         run
     }

@@ -48,7 +48,7 @@ fn the_paper_does_not_notice_a_bad_link() {
 }
 
 #[test]
-#[ignore = "long: run with --release -- --ignored"]
+#[ignore = "real time: cargo xtask test --full"]
 fn the_paper_does_not_notice_ten_thousand_bad_links() {
     disturbed(100_000..110_000);
 }
@@ -109,7 +109,7 @@ fn a_cancelled_sheet_is_a_whole_job_on_a_bad_link_too() {
 }
 
 #[test]
-#[ignore = "long: run with --release -- --ignored"]
+#[ignore = "real time: cargo xtask test --full"]
 fn ten_thousand_cancelled_sheets_are_whole_jobs() {
     cancelled(200_000..210_000, ALL, EVERYTHING);
 }

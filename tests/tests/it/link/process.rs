@@ -197,6 +197,7 @@ fn the_program_sends_pass_streams_and_waits_for_the_sheet() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_sheet_is_out_when_the_printer_was_seen_printing_and_has_ended() {
     let bench = Bench::new(8, 1000);
     // It says idle where it is asked first, prints where it is asked next, and is idle again.
@@ -208,6 +209,7 @@ fn a_sheet_is_out_when_the_printer_was_seen_printing_and_has_ended() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_bridge_without_memory_for_the_page_gets_the_job_as_it_is() {
     let bench = Bench::with(random_job(8), Port::new(&[Ink::White], 1000).with_band(100));
     let said = bench.says(0, "send job.rgl --to BRIDGE");
@@ -239,15 +241,17 @@ fn after_a_bridge_has_forgotten_nothing_is_sent_before_the_printer_was_reset() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn pulled_data_lines_cost_nothing_and_a_pulled_supply_costs_the_sheet_and_says_so() {
     for all in [false, true] {
         let bench = Bench::new(8, 100);
         bench.keep_busy(true);
         let mut child = bench.program("send job.rgl --to BRIDGE").spawn().unwrap();
         bench.until_it_prints();
-        bench.bridge.port.cut.store(true, Ordering::Relaxed);
-        bench.bridge.port.forget.store(all, Ordering::Relaxed);
-        std::thread::sleep(Duration::from_millis(300));
+        if all {
+            bench.bridge.strike(|port| &port.forget);
+        }
+        bench.bridge.strike(|port| &port.cut);
         bench.keep_busy(false);
         let mut said = String::new();
         child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
@@ -263,6 +267,7 @@ fn pulled_data_lines_cost_nothing_and_a_pulled_supply_costs_the_sheet_and_says_s
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_job_whose_folder_somebody_removes_is_told_as_lost_and_can_be_ended() {
     let bench = Bench::new(8, 100);
     bench.keep_busy(true);
@@ -279,6 +284,7 @@ fn a_job_whose_folder_somebody_removes_is_told_as_lost_and_can_be_ended() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_printer_switched_off_in_a_job_costs_the_sheet_and_is_reset_before_the_next_one() {
     let bench = Bench::new(8, 100);
     bench.keep_busy(true);
@@ -306,6 +312,7 @@ fn a_printer_switched_off_in_a_job_costs_the_sheet_and_is_reset_before_the_next_
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_reset_while_a_job_is_open_is_asked_about_first() {
     let bench = Bench::new(8, 20).queue(JobKind::Streams);
     bench.begun();
@@ -328,6 +335,7 @@ fn orphan() -> (Bench, u32) {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn an_orphan_is_cancelled_after_a_question_by_its_number_or_as_what_the_bridge_has_open() {
     for named in [false, true] {
         let (bench, number) = orphan();
@@ -348,13 +356,13 @@ fn an_orphan_is_cancelled_after_a_question_by_its_number_or_as_what_the_bridge_h
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn an_orphan_at_a_printer_that_takes_nothing_more_is_given_up_by_a_reset() {
     for restarted in [false, true] {
         let (bench, number) = orphan();
         if restarted {
             // Nobody has the data any more.
-            bench.bridge.port.restart.store(true, Ordering::Relaxed);
-            std::thread::sleep(Duration::from_millis(200));
+            bench.bridge.strike(|port| &port.restart);
             let said = bench.says(1, "cancel --to BRIDGE --yes");
             assert!(said.contains("bridge reset --to unix:"), "{said}");
         }
@@ -369,6 +377,7 @@ fn an_orphan_at_a_printer_that_takes_nothing_more_is_given_up_by_a_reset() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_sheet_that_the_bridge_finished_alone_is_told_behind_others_and_a_restart() {
     for restarted in [false, true] {
         let bench = Bench::new(8, 100).queue(JobKind::Streams);
@@ -387,8 +396,7 @@ fn a_sheet_that_the_bridge_finished_alone_is_told_behind_others_and_a_restart() 
         let other = other.env("FOILPRESS_JOBS", bench.folder.path().join("others")).output().unwrap();
         assert!(other.status.success(), "{}", String::from_utf8_lossy(&other.stderr));
         if restarted {
-            bench.bridge.port.restart.store(true, Ordering::Relaxed);
-            std::thread::sleep(Duration::from_millis(200));
+            bench.bridge.strike(|port| &port.restart);
         }
         let entry = Journal::at(&bench.jobs()).unwrap().entries().unwrap().remove(0);
         if !matches!(entry.record.phase, Phase::Ended(_)) {
@@ -422,8 +430,7 @@ fn a_printer_is_asked_only_where_it_can_do_no_harm() {
     bench.until_it_prints();
     child.kill().unwrap();
     child.wait().unwrap();
-    bench.bridge.port.forget.store(true, Ordering::Relaxed);
-    std::thread::sleep(Duration::from_millis(200));
+    bench.bridge.strike(|port| &port.forget);
     let before = asked(&bench);
     let (_, said) = bench.answered("bridge status --to BRIDGE", "");
     assert!(said.contains("may be inside a job that the bridge has forgotten"), "{said}");
@@ -434,6 +441,7 @@ fn a_printer_is_asked_only_where_it_can_do_no_harm() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_one_way_printer_is_remembered_and_asked_again_only_when_the_user_wants_to_know() {
     let bench = Bench::new(8, 1000);
     bench.bridge.port.one_way.store(true, Ordering::Relaxed);
@@ -456,6 +464,7 @@ fn a_one_way_printer_is_remembered_and_asked_again_only_when_the_user_wants_to_k
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_sender_that_is_killed_again_and_again_costs_nothing() {
     killed_again_and_again(JobKind::Raw);
     killed_again_and_again(JobKind::Streams);
@@ -550,6 +559,7 @@ fn two_passes() -> Bench {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn copies_are_printed_one_by_one_and_what_is_not_loaded_is_named_first() {
     let bench = two_passes();
     let (code, said) = bench.answered("send job.rgl --to BRIDGE --copies 2", "\n");
@@ -559,6 +569,7 @@ fn copies_are_printed_one_by_one_and_what_is_not_loaded_is_named_first() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_copy_nobody_pressed_enter_for_waits_on_disk_and_is_counted_when_it_is_printed() {
     let bench = two_passes();
     let (code, said) = bench.answered("send job.rgl --to BRIDGE --copies 3", "");

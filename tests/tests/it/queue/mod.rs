@@ -145,6 +145,7 @@ fn a_pdf_comes_out_as_the_sheets_it_draws() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_picture_comes_out_in_its_colours_where_they_are() {
     let server = server!();
     let bridge = Bridge::start(FAST);
@@ -214,6 +215,7 @@ fn on_card([left, bottom, right, top]: [i64; 4]) -> [usize; 4] {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn spot_colours_that_name_inks_are_printed_in_them_and_others_in_process_inks() {
     let server = server!();
     let bridge = Bridge::start(FAST);
@@ -266,6 +268,7 @@ fn spot_colours_that_name_inks_are_printed_in_them_and_others_in_process_inks() 
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_sheet_of_any_size_is_printed_where_the_user_wants_it_by_a_machine_that_is_not_exact() {
     let server = server!();
     let bridge = Bridge::start(FAST);
@@ -312,6 +315,7 @@ fn a_sheet_of_any_size_is_printed_where_the_user_wants_it_by_a_machine_that_is_n
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_printer_of_another_maker_gets_no_byte_and_stops_the_queue() {
     let server = server!();
     let bridge = Bridge::start(FAST);
@@ -335,6 +339,7 @@ fn a_printer_of_another_maker_gets_no_byte_and_stops_the_queue() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_raw_job_is_printed_byte_for_byte_as_often_as_asked() {
     let server = server!();
     let bridge = Bridge::start(FAST);
@@ -356,6 +361,7 @@ fn a_raw_job_is_printed_byte_for_byte_as_often_as_asked() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_stream_of_ghostscripts_driver_is_printed_as_it_is_page_by_page() {
     let server = server!();
     if !testing::needs::md5k() {
@@ -388,6 +394,7 @@ fn a_stream_of_ghostscripts_driver_is_printed_as_it_is_page_by_page() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn what_is_no_job_never_reaches_the_printer() {
     let server = server!();
     let bridge = Bridge::start(FAST);
@@ -403,6 +410,7 @@ fn what_is_no_job_never_reaches_the_printer() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn why_a_page_is_not_printed_is_said_with_the_job() {
     let server = server!();
     let bridge = Bridge::start(FAST);
@@ -424,6 +432,7 @@ fn why_a_page_is_not_printed_is_said_with_the_job() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_cancelled_job_leaves_a_printer_that_is_ready_for_the_next() {
     let server = server!();
     let bridge = Bridge::start(100);
@@ -447,6 +456,7 @@ fn a_cancelled_job_leaves_a_printer_that_is_ready_for_the_next() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn an_empty_tray_is_shown_and_the_job_goes_on_when_it_is_filled() {
     let server = server!();
     let bridge = Bridge::start(FAST);
@@ -467,6 +477,7 @@ fn an_empty_tray_is_shown_and_the_job_goes_on_when_it_is_filled() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn without_its_bridge_a_job_waits_and_says_so_until_it_is_plugged_in_or_the_job_cancelled() {
     let server = server!();
     let bridge = Bridge::start(FAST);
@@ -493,6 +504,7 @@ fn without_its_bridge_a_job_waits_and_says_so_until_it_is_plugged_in_or_the_job_
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn after_a_crash_of_the_print_system_a_job_goes_on_where_the_printer_is() {
     let mut server = server!();
     let bridge = Bridge::start(100);
@@ -515,6 +527,7 @@ fn after_a_crash_of_the_print_system_a_job_goes_on_where_the_printer_is() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_sheet_lost_with_its_bridge_is_held_and_printed_again_only_when_released() {
     let server = server!();
     let bridge = Bridge::start(100);
@@ -550,6 +563,7 @@ fn a_sheet_lost_with_its_bridge_is_held_and_printed_again_only_when_released() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_stopped_queue_ends_its_sheet_and_begins_it_anew_when_it_is_started() {
     let server = server!();
     let bridge = Bridge::start(100);

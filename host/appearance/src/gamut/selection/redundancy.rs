@@ -125,37 +125,25 @@ pub fn redundancy(
 mod tests {
     use super::*;
     use crate::brdf::Table;
-    use clarabel::algebra::CscMatrix;
-    use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT, ZeroConeT};
+    use crate::solve::{Columns, Gram, Simplex};
     use inks::{InkSet, Library};
 
-    /// The squared distance of a row to the convex hull of others in plain reflectance, by an interior-point solver: zero if
-    /// and only if the row is a mixture.
+    /// The squared distance of a row to the convex hull of others in plain reflectance, by one quadratic: zero if and only
+    /// if the row is a mixture.
     fn outside(rows: &Table, row: usize) -> f64 {
         let others: Vec<usize> = (0..rows.len()).filter(|&k| k != row).collect();
-        let n = others.len();
-        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let gram: Vec<Vec<f64>> = others
-            .iter()
-            .map(|&i| others.iter().map(|&j| 2.0 * product(rows.row(i), rows.row(j))).collect())
-            .collect();
-        let linear: Vec<f64> = others.iter().map(|&i| -2.0 * product(rows.row(i), rows.row(row))).collect();
-        let mut constraints = vec![vec![1.0; n]];
-        constraints
-            .extend((0..n).map(|i| (0..n).map(|j| if i == j { -1.0 } else { 0.0 }).collect::<Vec<_>>()));
-        let mut right = vec![1.0];
-        right.extend(vec![0.0; n]);
-        let cones = [ZeroConeT(1), NonnegativeConeT(n)];
-        let upper: Vec<Vec<f64>> =
-            (0..n).map(|i| (0..n).map(|j| if j >= i { gram[i][j] } else { 0.0 }).collect()).collect();
-        let settings = DefaultSettingsBuilder::default().verbose(false).build().unwrap();
-        let matrix = |rows: &[Vec<f64>]| CscMatrix::from(rows.iter());
-        let mut solver =
-            DefaultSolver::new(&matrix(&upper), &linear, &matrix(&constraints), &right, &cones, settings)
-                .unwrap();
-        solver.solve();
+        let mut hull = Table::new(rows.columns());
+        others.iter().for_each(|&k| hull.push(rows.row(k)));
+        let (mut products, mut weights) = (vec![0.0; others.len()], vec![0.0; others.len()]);
+        Columns::of_rows(&hull).products(rows.row(row), &mut products);
+        Simplex::new().solve(&Gram::of_rows(&hull), &products, &mut weights).unwrap();
+        let (mut off, mut size) = (0.0, 0.0);
+        for (column, &own) in rows.row(row).iter().enumerate() {
+            let mixed: f64 = weights.iter().enumerate().map(|(k, w)| w * hull.row(k)[column]).sum();
+            (off, size) = (off + (mixed - own).powi(2), size + own * own);
+        }
         // Relative to the row, whose peak may be large.
-        1.0 + solver.solution.obj_val / product(rows.row(row), rows.row(row))
+        off / size
     }
 
     /// Some stacks of the library, and two that are mixtures of them.
