@@ -6,10 +6,9 @@
 //! A release's images are the same bytes wherever they are built. The bridge's library lies outside of the firmware's workspace, and what the
 //! compiler calls it depends on the whole path: so the sources are reached by a link that has one place everywhere.
 
-use crate::{cargo, cargo_home, command, elf, succeed};
+use crate::{cargo, cargo_home, command, elf, succeed, tools};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
-use std::process::Stdio;
 use std::{env, fs};
 
 /// A firmware and the board it is built for.
@@ -87,9 +86,6 @@ const ROM: usize = 8 << 10;
 /// For what the folders' own settings have flags.
 const BARE: &str = r#"cfg(all(target_arch = "arm", target_os = "none"))"#;
 
-/// The compiler with clippy's lints.
-const CLIPPY: &str = "clippy-driver";
-
 const MEMORY: u32 = 0x2000_0000;
 
 /// Builds the bridge's images and writes them as UF2; gives the path of the Pico's.
@@ -129,11 +125,8 @@ fn build_for(board: &Board, root: &Path, link: Option<&Path>) -> Result<PathBuf>
     }
     // The folder's own settings name the linker's script and what is logged.
     build.args(board.arguments()).current_dir(&folder).env("CARGO_TARGET_DIR", &target);
-    if has_clippy() {
-        // What `cargo clippy -- -D warnings` sets.
-        build
-            .env("RUSTC_WORKSPACE_WRAPPER", CLIPPY)
-            .env("CLIPPY_ARGS", "-D__CLIPPY_HACKERY__warnings__CLIPPY_HACKERY__");
+    if tools::has_clippy() {
+        tools::with_lints(&mut build);
     }
     let status = build.status().context("cargo cannot be started")?;
     if !status.success() {
@@ -180,11 +173,6 @@ fn build_for(board: &Board, root: &Path, link: Option<&Path>) -> Result<PathBuf>
         bail!("the image of {} is larger than xtask/budgets.toml allows", board.folder);
     }
     Ok(path)
-}
-
-fn has_clippy() -> bool {
-    let mut version = command(CLIPPY, &["--version"]);
-    version.stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok_and(|status| status.success())
 }
 
 impl Board {

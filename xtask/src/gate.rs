@@ -64,7 +64,8 @@ pub fn run(root: &Path, is_full: bool) -> ExitCode {
     let start = Instant::now();
     let gate = Gate::default();
     gate.step("list of skipped tests", clear_skips);
-    let mut runner = Runner::find(root, is_full);
+    let found = gate.step("tools", || Runner::find(root, is_full).with_lints());
+    let Some(mut runner) = found else { return ExitCode::FAILURE };
     let repeat = runner.draw();
     eprintln!("{repeat}");
     let brought = std::thread::scope(|scope| {
@@ -74,31 +75,22 @@ pub fn run(root: &Path, is_full: bool) -> ExitCode {
                 succeed(cargo(&["fmt", "--all", "--check"]).current_dir(root.join(workspace)))
             })
         });
-        gate.step("lints", || {
-            succeed(&mut cargo(&[
-                "clippy",
-                "--workspace",
-                "--all-targets",
-                "--locked",
-                "--",
-                "-D",
-                "warnings",
-            ]))
-        });
+        // Every step builds for the same packages, so that nothing is built twice with other features.
+        gate.step("building the tests, with lints", || runner.build());
         if is_full {
             gate.step("lints for macOS and Windows", || foreign::lint(root));
+            gate.step("documentation of programs", || {
+                let mut doc = cargo(&["doc", "--workspace", "--no-deps", "--locked"]);
+                succeed(doc.env("RUSTDOCFLAGS", "-D warnings"))
+            });
         }
-        gate.step("documentation", || {
-            let mut doc = cargo(&["doc", "--workspace", "--no-deps", "--locked"]);
-            succeed(doc.env("RUSTDOCFLAGS", "-D warnings"))
-        });
-        // Every step builds for the same packages, so that nothing is built twice with other features.
-        gate.step("building the tests", || runner.build());
         brought.join().unwrap_or_default()
     });
     runner.name(brought);
-    let summary = gate.step("tests", || runner.all());
-    gate.step("examples of the documentation", || runner::documentation(root));
+    let summary = std::thread::scope(|scope| {
+        scope.spawn(|| gate.step("documentation and its examples", || runner.documentation()));
+        gate.step("tests", || runner.all())
+    });
     // The package is tried with the tests of print queues: where they fail, it would.
     if is_full && gate.failed().is_empty() {
         gate.step("package", || package::run_where_possible(root, &runner.program()));

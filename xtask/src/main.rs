@@ -31,9 +31,9 @@ struct Args {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Run everything that has to pass: format, lints (for macOS and Windows too), documents, all tests, emulator, print queues, package
+    /// Run everything that has to pass before a change lands: format, lints, documents, tests, emulator, browser
     Test {
-        /// Run the commands of documents and help as they stand, and sixteen times as many cases of each property, and the whole system under one seed after another: some three hours
+        /// Run also what takes real time, print queues, package and the lints for macOS and Windows, documents' commands as they stand, 32 times as many cases of each property, and the whole system under one seed after another: some three hours
         #[arg(long)]
         full: bool,
     },
@@ -74,6 +74,9 @@ const PROGRAM: &str = "FOILPRESS_PROGRAM";
 fn main() -> ExitCode {
     // The workspace, wherever this was started from: it is the folder above this package.
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."));
+    if let Some(folder) = std::env::var_os(runner::RUSTDOC_FOR) {
+        return finish(runner::rustdoc(Path::new(&folder)));
+    }
     match Args::parse().task {
         Task::Test { full } => gate::run(root, full),
         Task::Bench => finish(succeed(&mut cargo(&["bench", "--workspace", "--locked"]))),

@@ -6,7 +6,10 @@
 //! same tests, binary after binary.
 //! A test that takes real time or whole programs is marked `#[ignore = "real time: cargo xtask test --full"]`: it is built
 //! like all others, and runs where everything is tried or its subject is asked for.
-//! Limits: it runs no examples of the documentation; [`documentation`] does.
+//! For the gate our own crates are compiled once, by clippy, for lints and tests alike, and documentation is made of what that
+//! leaves ([`Runner::documentation`]): checking all crates and those below them by themselves took a third of the time of
+//! all building.
+//! Limits: the lints of programs' documentation are left to `--full`.
 
 use std::ffi::OsString;
 use std::io::{BufRead as _, BufReader, Write as _};
@@ -39,6 +42,7 @@ pub struct Runner<'a> {
     root: &'a Path,
     nextest: Option<PathBuf>,
     is_full: bool,
+    has_lints: bool,
     environment: Vec<(&'static str, OsString)>,
 }
 
@@ -59,7 +63,16 @@ impl<'a> Runner<'a> {
                 environment.push((CASES, FULL_CASES.into()));
             }
         }
-        Runner { root, nextest: nextest.ok(), is_full, environment }
+        Runner { root, nextest: nextest.ok(), is_full, has_lints: false, environment }
+    }
+
+    /// The same with lints, whose warnings are errors.
+    ///
+    /// # Errors
+    /// The toolchain has no clippy.
+    pub fn with_lints(self) -> Result<Runner<'a>> {
+        ensure!(tools::has_clippy(), "clippy is not installed; `rustup component add clippy`");
+        Ok(Runner { has_lints: true, ..self })
     }
 
     /// Names something to the tests.
@@ -81,9 +94,9 @@ impl<'a> Runner<'a> {
         program(self.root)
     }
 
-    /// Builds all tests.
+    /// Builds all tests, and what is only linted: benchmarks.
     pub fn build(&self) -> Result<()> {
-        succeed(&mut self.command(&["--no-run"], false))
+        succeed(&mut self.command(&["--no-run", "--all-targets"], false))
     }
 
     /// Runs all tests, those that take real time where everything is tried; returns what the runner says of all together.
@@ -119,8 +132,27 @@ impl<'a> Runner<'a> {
             (true, Some(_)) => drop(command.args(["--run-ignored", "all"])),
             (true, None) => drop(command.args(["--", "--include-ignored", "--skip", ELSEWHERE])),
         }
-        command.envs(self.environment.iter().map(|(name, value)| (name, value)));
+        self.prepare(&mut command);
         command
+    }
+
+    fn prepare(&self, command: &mut Command) {
+        if self.has_lints {
+            tools::with_lints(command);
+        }
+        command.envs(self.environment.iter().map(|(name, value)| (name, value)));
+    }
+
+    /// Documents all libraries, warnings being errors, and runs the examples of those that have any.
+    ///
+    /// `cargo doc` would check everything below them anew; where it tests, cargo gives rustdoc what is built already. So it
+    /// is this program that cargo starts as rustdoc, which is started twice ([`rustdoc`]).
+    pub fn documentation(&self) -> Result<()> {
+        let mut test = cargo(&["test", "--doc", "--workspace", "--locked", "--quiet"]);
+        self.prepare(&mut test);
+        test.env("RUSTDOC", env::current_exe()?)
+            .env(RUSTDOC_FOR, firmware::workspace_target(self.root).join("doc"));
+        succeed(test.current_dir(self.root))
     }
 
     fn profile(&self) -> &'static str {
@@ -175,27 +207,36 @@ fn program(root: &Path) -> PathBuf {
     firmware::workspace_target(root).join("debug/foilpress")
 }
 
-/// Runs the examples of the documentation, in the packages that have any: looking through one that has none takes seconds.
-pub fn documentation(root: &Path) -> Result<()> {
-    let workspace = fs::read_to_string(root.join("Cargo.toml"))?;
-    let (_, rest) = workspace.split_once("members = [").context("Cargo.toml names no members")?;
-    let members = rest.split(']').next().unwrap_or_default().split('"').skip(1).step_by(2);
-    let mut test = cargo(&["test", "--doc", "--locked", "--quiet"]);
-    let mut has_any = false;
-    for member in members {
-        let mut sources = Vec::new();
-        all_files(&root.join(member).join("src"), &mut sources)?;
-        sources.retain(|path| path.extension().is_some_and(|end| end == "rs"));
-        let texts = sources.iter().map(fs::read_to_string).collect::<io::Result<Vec<String>>>()?;
-        if texts.iter().any(|text| has_example(text)) {
-            let manifest = fs::read_to_string(root.join(member).join("Cargo.toml"))?;
-            let name = manifest.lines().find_map(|line| line.strip_prefix("name = \"")?.strip_suffix('"'));
-            test.args(["--package", name.with_context(|| format!("{member} has no name"))?]);
-            has_any = true;
+/// Where documentation goes; cargo starts this program as rustdoc then.
+pub const RUSTDOC_FOR: &str = "FOILPRESS_RUSTDOC_FOR";
+
+/// Stands for rustdoc, which cargo asks to test a library's examples: documents it first, and tests it if it has any.
+pub fn rustdoc(out: &Path) -> Result<()> {
+    let args: Vec<OsString> = env::args_os().skip(1).collect();
+    let Some(source) = args.iter().map(Path::new).find(|arg| arg.extension().is_some_and(|end| end == "rs"))
+    else {
+        return succeed(Command::new("rustdoc").args(&args));
+    };
+    let mut document = Command::new("rustdoc");
+    let mut rest = args.iter();
+    while let Some(arg) = rest.next() {
+        match arg.to_str() {
+            Some("--test") => {}
+            Some("--test-run-directory" | "--test-args") => drop(rest.next()),
+            _ => drop(document.arg(arg)),
         }
     }
-    ensure!(has_any, "no package has an example in its documentation");
-    succeed(test.current_dir(root))
+    succeed(document.args(["-D", "warnings", "--out-dir"]).arg(out))?;
+    let mut sources = Vec::new();
+    all_files(source.parent().unwrap_or(Path::new(".")), &mut sources)?;
+    sources.retain(|path| path.extension().is_some_and(|end| end == "rs"));
+    let texts = sources.iter().map(fs::read_to_string).collect::<io::Result<Vec<String>>>()?;
+    // Looking for examples where there are none takes seconds.
+    if texts.iter().any(|text| has_example(text)) {
+        succeed(Command::new("rustdoc").args(&args))
+    } else {
+        Ok(())
+    }
 }
 
 /// Whether a comment of the documentation shows Rust: a block that names no other language.

@@ -18,6 +18,22 @@ const NODE: [u32; 2] = [20, 19];
 /// The oldest whose handlers can execute a call on the program's side.
 const UMOCKDEV: &str = "0.17";
 
+/// The compiler with clippy's lints.
+const CLIPPY: &str = "clippy-driver";
+
+/// Whether the toolchain has clippy.
+pub fn has_clippy() -> bool {
+    succeeds(command(CLIPPY, &["--version"]).stderr(Stdio::null()))
+}
+
+/// Has a command of cargo compile our own crates with clippy, warnings being errors: what `cargo clippy -- -D warnings` sets.
+/// It makes code as the compiler does, only from programs that are not made simpler before LLVM sees them.
+pub fn with_lints(cargo: &mut Command) {
+    cargo
+        .env("RUSTC_WORKSPACE_WRAPPER", CLIPPY)
+        .env("CLIPPY_ARGS", "-D__CLIPPY_HACKERY__warnings__CLIPPY_HACKERY__");
+}
+
 /// Leaves a step out because something is missing.
 ///
 /// # Errors
