@@ -18,7 +18,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 
 use crate::firmware::BARE_METAL;
-use crate::runner::{self, Runner};
+use crate::runner::Runner;
 use crate::{cargo, command, emulator, foreign, package, preview, queue, succeed};
 
 /// Names the list of tests that were left out; `.cargo/config.toml` sets it.
