@@ -267,6 +267,18 @@ mod tests {
         assert_eq!(write(&longest[..], &mut buffer[..MAX - 1]), Err(TooLong));
     }
 
+    /// The link was cut in the middle of a frame that was too long: the first frame of the next one is read.
+    #[test]
+    fn after_a_reset_nothing_is_left_of_an_overlong_frame() {
+        let mut reader = Reader::new();
+        assert_eq!(reader.read(&[&[0][..], &[7; MAX + 1]].concat()), Read::More);
+        reader.reset();
+        let frame = framed(b"after");
+        assert!(
+            matches!(reader.read(&frame), Read::Message(message, []) if decode::<&[u8]>(message) == Ok(b"after"))
+        );
+    }
+
     #[test]
     fn an_overlong_frame_is_reported_once_and_the_next_one_is_read() {
         let mut bytes = framed(b"before");

@@ -61,6 +61,23 @@ fn decoded_along(
     }
 }
 
+/// A page that begins with another memory, as another job's does, has none of the dots that this one held.
+#[test]
+fn another_page_may_have_another_memory() {
+    let walk = Placed::whole(64, 8);
+    let mut bits = vec![0; 64];
+    bits[0] = 0x80;
+    let stream = coded_along(walk, &bits);
+    let mut decoder = Decoder::new(walk);
+    for dirt in [0, 0xee] {
+        decoder.begin(walk);
+        let mut memory = vec![dirt; band_bytes(64)];
+        let (_, step) = decoder.step(&stream, &mut memory).unwrap();
+        let Step::Band { y: 0, rows: 8, .. } = step else { panic!("{step:?}") };
+        assert!(memory[..64] == bits, "with {dirt:02x}");
+    }
+}
+
 /// A runs band by the text of the format: a list of bits and the band's dots, one after the other.
 fn runs_by_definition(order: &[(u16, u16)], minimum: u32, codes: &[u8]) -> Vec<(u16, u16)> {
     let len = order.len() as u32;

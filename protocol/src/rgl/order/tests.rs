@@ -186,6 +186,22 @@ fn rows_are_announced_inside_the_page_and_end_once() {
     assert_eq!(pass(&[PLAIN, Row { last: true, data: &[1] }, Skip(1)]), (2, Fault::RowAfterLast));
 }
 
+/// A shift moves the picture on a page that stays as it is: what was the last row or dot lies beyond it.
+#[test]
+fn a_shifted_row_has_to_lie_on_the_page() {
+    let mut begin = setup();
+    let at = begin.iter().position(|command| matches!(command, CurlCorrection(_))).unwrap();
+    begin.splice(at..at, [ShiftX(8), ShiftY(2)]);
+    let verdict = |rows: &[Command<'static>]| {
+        verdict(&[&begin[..], &[select(Ink::Black, true), PLAIN], rows, &end()].concat())
+    };
+    let first = begin.len() + 2;
+    let wide = |bytes: usize| Row { last: true, data: vec![0xff; bytes].leak() };
+    assert_eq!(verdict(&[Skip(6369), wide(599)]), Ok(true));
+    assert_eq!(verdict(&[Skip(6370), wide(599)]), Err((first + 1, Fault::BeyondLength)));
+    assert_eq!(verdict(&[Skip(6369), wide(600)]), Err((first + 1, Fault::BeyondWidth)));
+}
+
 #[test]
 fn a_dot_in_the_spare_bits_of_the_last_byte_is_beyond_the_width() {
     let mut commands = setup();
