@@ -60,9 +60,10 @@ pub(super) fn parse(text: &[u8]) -> Result<Root, (String, String)> {
     let mut reader = serde_json::Deserializer::from_slice(text);
     let root = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
         let path = error.path().to_string();
-        // A text that is no JSON has no field.
-        let field = if path == "." { "glTF".to_owned() } else { path };
-        (field, error.into_inner().to_string())
+        let error = error.into_inner();
+        // A text that is no JSON has no field, and neither has the whole.
+        let field = if path == "." || !error.is_data() { "glTF".to_owned() } else { path };
+        (field, error.to_string())
     })?;
     reader.end().map_err(|error| ("glTF".to_owned(), error.to_string()))?;
     Ok(root)
