@@ -4,6 +4,7 @@
 //! which the light's way in and the eye's way out each cross one cell of the screen. A weight is a sum over pairs of pieces.
 //! Cost: one product for each pair of pieces; one pair a cell in line, at most about sixteen otherwise.
 
+use maths::Maths;
 use press::preview::Radiance;
 use rayon::prelude::*;
 use sheet::DOTS_PER_MM;
@@ -39,7 +40,7 @@ impl Sight {
     pub fn half_angle(&self) -> f64 {
         let sum: [f64; 3] = std::array::from_fn(|c| self.light[c] + self.eye[c]);
         let length = sum.iter().map(|v| v * v).sum::<f64>().sqrt();
-        (sum[2] / length.max(1e-12)).clamp(0.0, 1.0).acos()
+        (sum[2] / length.max(1e-12)).clamp(0.0, 1.0).arccosine()
     }
 }
 
