@@ -94,9 +94,11 @@ impl<'a> Runner<'a> {
         program(self.root)
     }
 
-    /// Builds all tests, and what is only linted: benchmarks.
+    /// Builds all tests, and what is only linted: benchmarks, which the runner would start to learn their names.
     pub fn build(&self) -> Result<()> {
-        succeed(&mut self.command(&["--no-run", "--all-targets"], false))
+        let mut build = cargo(&["test", "--workspace", "--locked", "--no-run", "--all-targets"]);
+        self.prepare(build.current_dir(self.root));
+        succeed(&mut build)
     }
 
     /// Runs all tests, those that take real time where everything is tried; returns what the runner says of all together.
