@@ -28,11 +28,9 @@ mod tests {
         for v in (0..=100_000).map(|i| i as f32 / 100_000.0) {
             let (linear, encoded): (f32, f32) = (Srgb::into_linear(v), Srgb::from_linear(v));
             assert!((decode(v) - linear).abs() <= f32::EPSILON * linear, "{v}: {} {linear}", decode(v));
-            assert!(
-                (encode(v) - encoded).abs() <= 2.0 * f32::EPSILON * encoded,
-                "{v}: {} {encoded}",
-                encode(v)
-            );
+            // What is left after .055 is taken away keeps the rounding of the sum, here two last places.
+            let bound = 2.0 * f32::EPSILON * (encoded + 0.055);
+            assert!((encode(v) - encoded).abs() <= bound, "{v}: {} {encoded}", encode(v));
         }
         assert_eq!((decode(-1.0), encode(-1.0), encode(7.0)), (0.0, 0.0, 1.0));
         assert!((decode(2.0) - 4.953_75).abs() < 1e-4 && decode(f32::NAN).is_nan());
