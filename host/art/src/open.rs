@@ -1,26 +1,24 @@
 //! Reads art from files: chooses the reader by what a file holds, and joins several files into one artwork.
 //!
-//! Method: the first bytes tell PDF, PostScript, TIFF, SVG and JPEG apart. A picture whose name is that of an ink is a
-//! layer, and so is a page of a TIFF for which an ink is named; any other picture is colour for the process inks. If only a
-//! part of its name is an ink, it must also look like a layer. Cost: that of the readers; files are read in pairs, so both
+//! Method: the first bytes tell PDF, PostScript, SVG and files of layers from pictures, of which names say what they print
+//! ([`inks_by_name`]). Of several files each is the layer of an ink, and so is each page of a TIFF for which inks are named. Cost: that of the readers; files are read in pairs, so both
 //! cores work and at most two layers are in memory as bytes. Limits: layers must have the same size in pixels.
 
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use observe::{Diagnosis, Fault, Observer};
+use observe::{Diagnosis, Observer};
 use protocol::ink::Ink;
 use rayon::prelude::*;
+use readers::Request;
+use readers::resolution::Dpi;
 
-use super::artwork::{Artwork, Layer};
-use super::coverage::{self, Scan};
-use super::error::{NamedPart, io, no_dot, nothing, unknown_ink, wrong};
+use super::artwork::Artwork;
+use super::coverage::Scan;
+use super::error::{NamedPart, io, nothing, unknown_ink, wrong};
+use super::inks_by_name::{self, Layers, Source};
 use super::names::{self, stem};
 use super::options::{Options, Pages};
-use super::picture::Looks;
-use super::size::{self, MOST_BYTES, Unstated};
-use super::{cmyk, layered, pdf, picture, svg, tiff, tiff_pages};
-use readers::resolution::Dpi;
+use super::{file, layered, pdf, svg};
 
 /// File extensions of pictures.
 const PICTURES: [&str; 11] = ["png", "tif", "tiff", "jpg", "jpeg", "pgm", "pbm", "ppm", "bmp", "gif", "webp"];
@@ -90,77 +88,29 @@ pub fn is_art(path: &Path) -> bool {
 }
 
 fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, Diagnosis> {
-    let start = start_of(file)?;
+    let start = file::start(file)?;
     if pdf::is_document(&start) {
         return pdf::read(file, options, observer);
     }
-    if tiff_pages::is_tiff(&start) {
-        if let Pages::Inks(inks) = &options.pages {
-            return pages_of_inks(file, inks, options, observer);
-        }
-        if let Some(art) = tiff::read(file, options)? {
-            return Ok(art);
-        }
-    } else {
+    let is_tiff = readers::is_tiff(&start);
+    if let (true, Pages::Inks(inks)) = (is_tiff, &options.pages) {
+        return pages_of_inks(file, inks, options, observer);
+    }
+    if !is_tiff {
         without_pages(file, options)?;
     }
     if svg::is_svg(file, &start) {
         return svg::read(file, options, observer);
     }
-    if layered::is_layered(&start) {
-        return layered::read(file, options, observer);
+    let bytes = file::whole(file, file::MOST)?;
+    if readers::is_layered(&start) {
+        return layered::read(file, bytes, options, observer);
     }
-    let name = stem(file);
-    let named = names::ink(&name).filter(|_| !options.reserves());
-    let looks = named.map_or(Looks::Layer, |named| match picture::looks(file, options.page()) {
-        Looks::Tones if options.tones.contains(named.ink) => Looks::Layer,
-        looks => looks,
-    });
-    let is_exact = names::is_exact(&name);
-    if let Some(named) = named
-        && (looks == Looks::Layer || is_exact && names::is_whole(&name))
-    {
-        let mut art = named_files(&name, &[file.to_path_buf()], options, observer)?;
-        if !is_exact || looks != Looks::Layer {
-            art.notes.push(format!(
-                "{} is printed as the layer {}, because of its name; rename it to print it as a picture",
-                file.display(),
-                named.ink.name()
-            ));
-        }
-        return Ok(art);
-    }
-    if start.starts_with(b"\xff\xd8")
-        && let Some(art) = cmyk::read_jpeg(file, options)?
-    {
-        return Ok(art);
-    }
-    let pixels = picture::read(file, options.page())?;
-    let mut art = picture::artwork(&stem(file), pixels, options)?;
-    let close = || names::closest(&stem(file)).map(|known| (known, "its name is that of no ink"));
-    let why = match looks {
-        Looks::Tones => "it has many tones and only a part of its name is an ink",
-        _ => "it has colours and only a part of its name is an ink",
-    };
-    let part = named.map(|named| (named.ink.name(), why));
-    let meant = part.or_else(close).filter(|_| !options.reserves() && art.drawn.dots() > 0);
-    if let Some((known, why)) = meant {
-        art.notes.push(format!(
-            "{}: printed as a picture in process inks, because {why}; to print it as a layer of {known}, rename the file to \
-             {known}.{}",
-            file.display(),
-            file.extension().unwrap_or_default().display()
-        ));
-    }
-    Ok(art)
-}
-
-/// The first bytes of a file.
-fn start_of(file: &Path) -> Result<Vec<u8>, Diagnosis> {
-    let mut start = Vec::new();
-    let opened = std::fs::File::open(file).map_err(io(file, "open it"))?;
-    opened.take(1 << 12).read_to_end(&mut start).map_err(io(file, "read it"))?;
-    Ok(start)
+    // One layer, or colours that stand for inks, are no four plates.
+    let is_one = !is_tiff && (options.reserves() || names::ink(&stem(file)).is_some());
+    let planes: Option<&dyn Fn(&str) -> bool> = if is_one { None } else { Some(&inks_by_name::is_wanted) };
+    let asked = Request { page: options.page(), planes, ..file::PICTURE };
+    inks_by_name::artwork(file::picture_of(file, bytes, &asked)?, options)
 }
 
 /// Refuses a choice of pages where there are none.
@@ -239,18 +189,17 @@ fn named_files(
         let ink = stem(path);
         let named =
             names::ink(&ink).ok_or_else(|| unknown_ink(path, NamedPart::File, &ink, names::closest(&ink)))?;
-        let start = start_of(path)?;
+        let start = file::start(path)?;
         let kinds = [
             (svg::is_svg(path, &start), "SVG"),
             (pdf::is_document(&start), "PDF or PostScript"),
-            (layered::is_layered(&start), "OpenRaster or Krita's own format"),
+            (readers::is_layered(&start), "OpenRaster or Krita's own format"),
         ];
         if let Some((_, kind)) = kinds.into_iter().find(|(is, _)| *is) {
             let problem = format!("it is {kind}, which is read alone and cannot be one of several layers");
             return Err(wrong(path, problem).hint("export it as PNG, or draw all layers in it"));
         }
-        let label = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-        Ok(Source { path: path.clone(), page: options.page(), label, named })
+        Ok(Source { page: options.page(), ..Source::of_file(path, named) })
     };
     let sources: Vec<Source> = files.iter().map(source).collect::<Result<_, _>>()?;
     layers(name, &sources, None, options, observer)
@@ -263,11 +212,7 @@ fn pages_of_inks(
     options: &Options,
     observer: &dyn Observer,
 ) -> Result<Artwork, Diagnosis> {
-    let reading = io(file, "read it");
-    if std::fs::metadata(file).map_err(&reading)?.len() > MOST_BYTES {
-        return Err(wrong(file, "the file is larger than a gigabyte"));
-    }
-    let pages = tiff_pages::count(&std::fs::read(file).map_err(&reading)?);
+    let pages = readers::pages(&file::whole(file, file::MOST)?);
     if pages != inks.len() {
         let problem = format!("it has {pages} pages, but {} inks are named for them", inks.len());
         return Err(wrong(file, problem));
@@ -282,16 +227,6 @@ fn pages_of_inks(
     layers(&stem(file), &sources, None, options, observer)
 }
 
-/// Where a layer is.
-struct Source {
-    path: PathBuf,
-    /// Page of a TIFF.
-    page: Option<u32>,
-    /// What notes call it.
-    label: String,
-    named: names::Named,
-}
-
 /// One layer for each source, all of one size. The resolution that any of them states is `stated` where it is known.
 fn layers(
     name: &str,
@@ -301,76 +236,22 @@ fn layers(
     observer: &dyn Observer,
 ) -> Result<Artwork, Diagnosis> {
     observer.begin("reading layers", sources.len() as u64);
-    let mut first: Option<First> = None;
-    let mut art: Option<Artwork> = None;
-    let mut notes = Vec::new();
-    for sources in sources.chunks(2) {
-        let scans: Vec<_> =
-            sources.par_iter().map(|source| coverage::scan(&source.path, source.page)).collect();
-        for (scan, source) in scans.into_iter().zip(sources) {
-            let mut scan = scan?;
-            if first.as_ref().is_some_and(|first| first.dpi.is_none()) && scan.dpi.is_some() {
+    let mut layers = Layers::new(name, stated, options);
+    for pair in sources.chunks(2) {
+        let read = |source: &Source| Ok(Scan::of_picture(file::picture(&source.path, source.page)?));
+        let scans: Vec<Result<Scan, Diagnosis>> = pair.par_iter().map(read).collect();
+        for (scan, source) in scans.into_iter().zip(pair) {
+            let scan = scan?;
+            if layers.learns_of(&scan) {
                 observer.end();
-                return layers(name, sources, scan.dpi, options, observer);
+                return self::layers(name, sources, scan.dpi, options, observer);
             }
-            scan.dpi = scan.dpi.or(stated);
-            let dots = match &first {
-                Some(first) => first.check(&scan, options)?,
-                None => first.insert(First::new(&scan, options, &mut notes)?).dots,
-            };
-            let art = art.get_or_insert_with(|| Artwork::blank(name, dots));
-            let drawn = source.page.is_some() && scan.coverage.iter().any(|&c| c > 0);
-            art.add(scan, &source.label, source.named, false, options);
-            if drawn && art.layers.last().is_none_or(Layer::is_blank) {
-                return Err(no_dot(&source.path, &source.label, source.named.ink));
-            }
+            layers.add(scan, source)?;
             observer.advance(1);
         }
     }
     observer.end();
-    // Every caller gives at least one file, so there is art.
-    let mut art = art.ok_or_else(|| nothing("no file was given"))?;
-    art.notes.splice(0..0, notes);
-    Ok(art)
-}
-
-/// The first of several layers, whose size the others must have.
-struct First {
-    path: PathBuf,
-    pixels: (u32, u32),
-    dpi: Option<Dpi>,
-    size: String,
-    dots: (usize, usize),
-}
-
-impl First {
-    fn new(scan: &Scan, options: &Options, notes: &mut Vec<String>) -> Result<First, Diagnosis> {
-        let sides = (f64::from(scan.width), f64::from(scan.height));
-        Ok(First {
-            path: scan.path.clone(),
-            pixels: (scan.width, scan.height),
-            dpi: scan.dpi,
-            size: scan.size_at(options.dpi),
-            dots: size::dots(&scan.path, sides, scan.dpi, Unstated::PixelPerDot, options, notes)?,
-        })
-    }
-
-    /// Checks that another layer has the same size, and returns that size in dots.
-    fn check(&self, other: &Scan, options: &Options) -> Result<(usize, usize), Diagnosis> {
-        // A layer without a resolution has that of another. If two state different ones, one of them is wrong.
-        let overridden = options.dpi.is_some() || options.size.is_some();
-        let apart = self
-            .dpi
-            .zip(other.dpi)
-            .is_some_and(|(a, b)| !overridden && ((a.0 - b.0).abs() > 0.5 || (a.1 - b.1).abs() > 0.5));
-        if self.pixels == (other.width, other.height) && !apart {
-            return Ok(self.dots);
-        }
-        let (path, found) = (other.path.display(), other.size_at(options.dpi));
-        let problem = format!("{path} is {found}, but {} is {}", self.path.display(), self.size);
-        Err(Diagnosis::new(Fault::File, problem)
-            .hint("layers are printed one on another pixel by pixel, so export all of them at the same size"))
-    }
+    layers.artwork()
 }
 
 /// A name for a job of several files: that of their folder, unless it is the current one.

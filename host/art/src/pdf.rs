@@ -24,11 +24,12 @@ use super::coverage::Scan;
 use super::error::{io, no_dot, nothing, several_pages, wrong};
 use super::names::{self, stem};
 use super::options::{Options, Pages};
-use super::picture;
 use super::size::{self, Unstated};
+use super::{file, picture};
 use draw::{DRAFT, Drafts, Leaf, Part, Tagged};
 use files::scratch::Scratch;
 use observe::{Diagnosis, Observer};
+use readers::Raster;
 
 pub use complaint::{OLDER, cut_short, damaged, no_page};
 pub use ghostscript::{Interpreter, command, interpreter, order};
@@ -45,9 +46,7 @@ pub(super) fn is_document(start: &[u8]) -> bool {
 /// Whether these are the first bytes of a PDF. Spoolers and mail programs write a few lines before its header.
 fn is_pdf(start: &[u8]) -> bool {
     let other = || {
-        image::guess_format(start).is_ok()
-            || start.trim_ascii_start().starts_with(b"<")
-            || start.starts_with(b"%!")
+        readers::is_picture(start) || start.trim_ascii_start().starts_with(b"<") || start.starts_with(b"%!")
     };
     start.starts_with(b"%PDF")
         || start[..start.len().min(HEADER)].windows(5).any(|word| word == b"%PDF-") && !other()
@@ -200,8 +199,10 @@ impl Document<'_> {
     /// A page as coverage.
     fn layer(&self, leaf: &Leaf, dpi: (f64, f64)) -> Result<Scan, Diagnosis> {
         let drawn = draw::picture((self.path, self.interpreter), leaf.number, dpi, self.folder)?;
-        let pixels = picture::read(&drawn, None)?;
-        Ok(Scan::of_page(self.path, (pixels.width, pixels.height), &pixels.rgba))
+        let mut picture = file::picture(&drawn, None)?;
+        picture.to_srgb()?;
+        let rgba = picture.colours.map_or_else(Vec::new, Raster::into_rgba);
+        Ok(Scan::of_page(self.path, picture.size, &rgba))
     }
 
     /// The resolution at which a page has its final number of dots: that of the printer, as in a print queue, unless a size is set.

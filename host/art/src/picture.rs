@@ -1,83 +1,22 @@
 //! A picture as art: transparency, reserved colours, and colour for the process inks.
 //!
-//! Method: the picture is brought to sRGB by its embedded profile and laid on white by its transparency. Reserved colours
+//! Method: the picture, in sRGB, is laid on white by its transparency. Reserved colours
 //! become layers if the options say so; whatever else is not white is colour.
 //! Cost: four bytes a pixel, and some nanoseconds. Limits: 8 bits a channel.
 
-use maths::Maths;
 use std::collections::{HashMap, HashSet};
-use std::fs::File;
-use std::io::{BufReader, Read};
-use std::path::{Path, PathBuf};
 
-use image::DynamicImage;
-use moxcms::{ColorProfile, DataColorSpace, Layout, TransformOptions};
 use observe::Diagnosis;
 use rayon::prelude::*;
+use readers::{Picture, Raster};
 
 use super::artwork::Artwork;
 use super::colour::Colour;
-use super::decode::decode;
-use super::error::{io, wrong};
+use super::names::stem;
 use super::options::Options;
 use super::size::{self, Unstated};
 use super::{bitplane, object_type, pixels, resample, reserved, scans};
-use readers::resolution::Dpi;
 use sheet::Plane;
-
-/// A picture in sRGB with straight alpha.
-pub(super) struct Pixels {
-    pub path: PathBuf,
-    pub width: u32,
-    pub height: u32,
-    pub dpi: Option<Dpi>,
-    /// Red, green, blue, opacity.
-    pub rgba: Vec<u8>,
-    pub notes: Vec<String>,
-}
-
-/// Reads a picture and converts its colours to sRGB; of a TIFF with several pages the one of this number.
-pub(super) fn read(path: &Path, page: Option<u32>) -> Result<Pixels, Diagnosis> {
-    let file = File::open(path).map_err(io(path, "open it"))?;
-    of(path, BufReader::new(file), page)
-}
-
-/// The same from the bytes of a picture in the file at `path`.
-pub(super) fn of(path: &Path, bytes: impl Read, page: Option<u32>) -> Result<Pixels, Diagnosis> {
-    let decoded = decode(path, bytes, page)?;
-    let (width, height) = (decoded.image.width(), decoded.image.height());
-    let mut notes = decoded.notes;
-    let deep = matches!(
-        decoded.image,
-        DynamicImage::ImageLuma16(_)
-            | DynamicImage::ImageLumaA16(_)
-            | DynamicImage::ImageRgb16(_)
-            | DynamicImage::ImageRgba16(_)
-    );
-    if deep {
-        notes.push(format!("{}: 16 bits per channel are reduced to 8", path.display()));
-    }
-    let grey = !decoded.image.color().has_color();
-    let mut rgba = decoded.image.into_rgba8().into_raw();
-    if let Some(profile) = decoded.profile {
-        notes.extend(to_srgb(path, &profile, grey, &mut rgba)?);
-    }
-    if let Some(gamma) = decoded.gamma {
-        let table: Vec<u8> = (0..=255).map(|v| of_power(v, gamma)).collect();
-        rgba.par_chunks_exact_mut(4).for_each(|pixel| {
-            pixel[..3].iter_mut().for_each(|v| *v = table[usize::from(*v)]);
-        });
-        notes.push(format!("{}: its gamma of {gamma:.3} was applied", path.display()));
-    }
-    Ok(Pixels { path: path.to_path_buf(), width, height, dpi: decoded.dpi, rgba, notes })
-}
-
-/// A value whose light has this power, in sRGB (IEC 61966-2-1).
-fn of_power(value: u8, gamma: f64) -> u8 {
-    let light = (f64::from(value) / 255.0).power(1.0 / gamma);
-    let encoded = if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.power(1.0 / 2.4) - 0.055 };
-    (255.0 * encoded).round() as u8
-}
 
 /// Colours of which red, green and blue differ by so much are no grey.
 const COLOURED: u8 = 48;
@@ -101,10 +40,11 @@ pub(super) enum Looks {
     Tones,
 }
 
-/// What a picture looks like. A file that cannot be read looks like a layer, whose reader tells why.
-pub(super) fn looks(path: &Path, page: Option<u32>) -> Looks {
-    let Ok(Pixels { rgba, .. }) = read(path, page) else { return Looks::Layer };
-    let (pixels, _) = rgba.as_chunks::<4>();
+/// What a picture looks like. One whose colours cannot be brought to sRGB looks like a layer, of which no colour matters.
+pub(super) fn looks(mut picture: Picture) -> Looks {
+    let colours = picture.to_srgb().ok().and(picture.colours);
+    let Some(colours) = colours else { return Looks::Layer };
+    let pixels = colours.samples.as_chunks::<4>().0;
     match () {
         () if has_colours(pixels) => Looks::Colours,
         () if has_tones(pixels) => Looks::Tones,
@@ -143,48 +83,6 @@ fn has_tones(pixels: &[[u8; 4]]) -> bool {
     2 * toned > drawn && counts.iter().all(|count| 2 * count < toned)
 }
 
-/// Applies an embedded profile, and returns a note if that changed anything. `grey` marks pixels of a greyscale file.
-pub(super) fn to_srgb(
-    path: &Path,
-    profile: &[u8],
-    grey: bool,
-    rgba: &mut [u8],
-) -> Result<Option<String>, Diagnosis> {
-    let Ok(profile) = ColorProfile::new_from_slice(profile) else {
-        return Ok(Some(format!("{}: its colour profile is damaged, so it is read as sRGB", path.display())));
-    };
-    let of_grey = match profile.color_space {
-        DataColorSpace::Rgb => false,
-        DataColorSpace::Gray if grey => true,
-        other => {
-            return Err(wrong(path, format!("its colour profile is for {other:?}, but its pixels are not"))
-                .hint("convert the picture to sRGB"));
-        }
-    };
-    let srgb = ColorProfile::new_srgb();
-    let bad = |error| {
-        wrong(path, format!("its colour profile cannot be applied ({error})")).hint("convert it to sRGB")
-    };
-    let layout = if of_grey { Layout::GrayAlpha } else { Layout::Rgba };
-    let transform = profile
-        .create_transform_8bit(layout, &srgb, Layout::Rgba, TransformOptions::default())
-        .map_err(bad)?;
-    let mut changed = false;
-    let mut line = vec![0; 4 << 12];
-    let mut greys = Vec::new();
-    for pixels in rgba.chunks_mut(4 << 12) {
-        let line = &mut line[..pixels.len()];
-        if of_grey {
-            greys.clear();
-            greys.extend(pixels.as_chunks::<4>().0.iter().flat_map(|&[v, _, _, alpha]| [v, alpha]));
-        }
-        transform.transform(if of_grey { &greys } else { &*pixels }, line).map_err(bad)?;
-        changed |= pixels != line;
-        pixels.copy_from_slice(line);
-    }
-    Ok(changed.then(|| format!("{}: its colour profile was applied", path.display())))
-}
-
 /// Art from a page with tags. What nothing was drawn on is transparent, which is known even if every dot is drawn.
 pub(super) fn tagged_artwork(
     name: &str,
@@ -199,17 +97,19 @@ pub(super) fn tagged_artwork(
 }
 
 /// Art from one picture: reserved colours as layers if the options say so, the rest as colour.
-pub(super) fn artwork(name: &str, mut pixels: Pixels, options: &Options) -> Result<Artwork, Diagnosis> {
-    let sides = (f64::from(pixels.width), f64::from(pixels.height));
+pub(super) fn artwork(mut picture: Picture, options: &Options) -> Result<Artwork, Diagnosis> {
+    picture.to_srgb()?;
+    let sides = (f64::from(picture.size.0), f64::from(picture.size.1));
     let unstated = if options.reserves() { Unstated::PixelPerDot } else { Unstated::FillRoom };
-    let dots = size::dots(&pixels.path, sides, pixels.dpi, unstated, options, &mut pixels.notes)?;
-    Ok(artwork_of(name, pixels, dots, options))
+    let dots = size::dots(&picture.name, sides, picture.resolution, unstated, options, &mut picture.notes)?;
+    Ok(artwork_of(picture, dots, options))
 }
 
-/// The same at a known size in dots.
-pub(super) fn artwork_of(name: &str, pixels: Pixels, dots: (usize, usize), options: &Options) -> Artwork {
-    let Pixels { path, width, height, mut rgba, notes, .. } = pixels;
-    let size = (width, height);
+/// The same from colours in sRGB at a known size in dots.
+pub(super) fn artwork_of(picture: Picture, dots: (usize, usize), options: &Options) -> Artwork {
+    let Picture { name: path, size, colours, notes, .. } = picture;
+    let name = stem(&path);
+    let mut rgba = colours.map_or_else(Vec::new, Raster::into_rgba);
     let transparent = rgba.par_chunks_exact(4).any(|p| p[3] < 255);
     let opaque = transparent.then(|| plane_of::<4>(&rgba, size, dots, |p| p[3] > 127));
     rgba.par_chunks_exact_mut(4).for_each(|p| {
@@ -224,8 +124,8 @@ pub(super) fn artwork_of(name: &str, pixels: Pixels, dots: (usize, usize), optio
         rgb.copy_within(4 * at..4 * at + 3, 3 * at);
     }
     rgb.truncate(rgb.len() / 4 * 3);
-    let file = path.file_name().map_or_else(|| name.into(), |file| file.to_string_lossy().into_owned());
-    let mut art = opaque_artwork::<3>(name, &file, size, dots, rgb, options);
+    let file = path.file_name().map_or_else(|| name.clone(), |file| file.to_string_lossy().into_owned());
+    let mut art = opaque_artwork::<3>(&name, &file, size, dots, rgb, options);
     art.opaque = opaque;
     art.notes.splice(..0, notes);
     art

@@ -5,13 +5,11 @@
 //! classes, the one that most pixels of a dot have is taken, and nothing (class 0) only if more than half have it. The coverage of a solid
 //! layer is the average of a dot's pixels. So a line that covers half of its dots is whole: at 1200 dpi every line.
 //! Tones, and coverage where there are fewer pixels than dots, are interpolated (a triangle filter).
-//! Cost: nothing where pixels are dots; otherwise that of the `image` crate, or 2 ns a pixel. Limits: lines thinner than half a dot are lost,
+//! Cost: nothing where pixels are dots; otherwise that of [`readers::resized`], or 2 ns a pixel. Limits: lines thinner than half a dot are lost,
 //! and a pattern of single pixels becomes solid.
 
 use std::ops::Range;
 
-use image::GrayImage;
-use image::imageops::FilterType;
 use rayon::prelude::*;
 
 use super::error::resolution_in_words;
@@ -22,13 +20,7 @@ pub(super) fn tones(coverage: Vec<u8>, from: (u32, u32), to: (usize, usize)) -> 
     if sides(from) == to {
         return coverage;
     }
-    // The length is the product of the sides, so there is always an image.
-    match GrayImage::from_raw(from.0, from.1, coverage) {
-        Some(image) => {
-            image::imageops::resize(&image, to.0 as u32, to.1 as u32, FilterType::Triangle).into_raw()
-        }
-        None => vec![0; to.0 * to.1],
-    }
+    readers::resized(coverage, from, (to.0 as u32, to.1 as u32))
 }
 
 /// Coverage at the dots of a layer that is cut at half.

@@ -7,37 +7,16 @@
 
 use std::path::Path;
 
-use super::error::{beyond, no_size, too_large, too_small, wrong};
+use super::error::{beyond, no_size, too_large, too_small};
 use super::options::{Options, Room};
 use observe::Diagnosis;
 use readers::resolution::Dpi;
 use sheet::Size;
 
-/// The most pixels of a picture: a page at 1200 dpi.
-pub(super) const MOST_PIXELS: u64 = 1 << 28;
-
-/// The most bytes of a file.
-pub(super) const MOST_BYTES: u64 = 1 << 30;
-
 /// Millimetres in a dot.
 pub(super) const MM: f64 = 25.4 / DPI;
 /// Dots in an inch, across and down; there are `Options::across` times as many across.
 pub(super) const DPI: f64 = 600.0;
-
-/// Refuses absurd sizes before anything is allocated.
-pub(super) fn check_pixels(path: &Path, width: u32, height: u32) -> Result<(), Diagnosis> {
-    if width == 0 || height == 0 {
-        return Err(wrong(path, format!("the picture is {width} x {height} pixels; expected at least one")));
-    }
-    if u64::from(width) * u64::from(height) > MOST_PIXELS {
-        return Err(wrong(
-            path,
-            format!("the picture is {width} x {height} pixels, more than a page at 1200 dpi"),
-        )
-        .hint("make it smaller"));
-    }
-    Ok(())
-}
 
 /// How large to print a picture whose file states no resolution.
 #[derive(Clone, Copy, PartialEq, Debug)]

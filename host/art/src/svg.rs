@@ -40,9 +40,8 @@ use super::coverage::{Coverage, Scan};
 use super::error::{io, nothing, wrong};
 use super::names::stem;
 use super::options::Options;
-use super::picture;
 use super::size::{self, Unstated};
-use super::svg_kinds;
+use super::{file, picture, svg_kinds};
 use crate::process;
 use find::{Cuts, Layer};
 use observe::{Diagnosis, Observer};
@@ -59,11 +58,7 @@ const MOST_BYTES: u64 = 1 << 28;
 
 /// Reads a drawing.
 pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, Diagnosis> {
-    let reading = io(path, "read it");
-    if std::fs::metadata(path).map_err(&reading)?.len() > MOST_BYTES {
-        return Err(wrong(path, format!("the drawing is larger than {} MB", MOST_BYTES >> 20)));
-    }
-    let bytes = std::fs::read(path).map_err(&reading)?;
+    let bytes = file::whole(path, (MOST_BYTES, "256 MB, which is more than a drawing has"))?;
     let (steps, done) = mpsc::channel();
     let drawing = Drawing { path: path.to_path_buf(), options: options.clone() };
     let begun = thread::Builder::new().name(DRAWING.into()).stack_size(bounds::STACK).spawn(move || {

@@ -1,35 +1,51 @@
-//! Whether a JPEG file is whole.
+//! What the markers of a JPEG file tell: its size, its channels, and whether it is whole.
 //!
 //! Problem: decoders of JPEG fill what is missing at the end of a file with grey, for browsers.
-//! Method: the segments before the first scan have lengths; behind it, only the end of the picture is FF D9, because scans write FF as
+//! Method: segments have lengths, and are stepped over; within a scan only the end of the picture is FF D9, because scans write FF as
 //! FF 00. A thumbnail, which has an end of its own, lies within a segment. Cost: one pass over the bytes.
 //! Limits: damage within a scan is not seen.
 //! Source: ITU-T T.81, annex B.
 
-use memchr::memmem;
-
-/// Marker of a scan.
-const SCAN: u8 = 0xda;
-
-/// Whether the file has a scan and no end.
-pub fn is_cut_short(bytes: &[u8]) -> bool {
-    scans(bytes).is_some_and(|scans| memmem::find(scans, b"\xff\xd9").is_none())
+/// Whether the file has the marker of its end, outside of the segments with data of their own.
+pub fn is_whole(bytes: &[u8]) -> bool {
+    let mut rest = bytes;
+    while let Some(at) = memchr::memchr(0xff, rest) {
+        rest = &rest[at + 1..];
+        match rest.first() {
+            Some(0xd9) => return true,
+            // An FF among the data of a scan, a restart, a start, or one more FF.
+            Some(0 | 1 | 0xd0..=0xd8 | 0xff) => {}
+            _ => {
+                let Some(&[_, high, low]) = rest.first_chunk() else { return false };
+                rest = rest.get(1 + usize::from(u16::from_be_bytes([high, low]))..).unwrap_or_default();
+            }
+        }
+    }
+    false
 }
 
-/// What follows the marker of the first scan; nothing if there is none.
-fn scans(bytes: &[u8]) -> Option<&[u8]> {
+/// Channels, height and width, from the first of its frame headers.
+fn frame(bytes: &[u8]) -> Option<(u8, u16, u16)> {
     let mut rest = bytes.strip_prefix(b"\xff\xd8")?;
     loop {
-        let [0xff, after @ ..] = rest else { return None };
-        // Before a marker there may be any number of FF.
-        rest = &after[after.iter().position(|&byte| byte != 0xff)?..];
-        let (&marker, after) = rest.split_first()?;
-        if marker == SCAN {
-            return Some(after);
+        let (&[0xff, marker, high, low], body) = rest.split_first_chunk::<4>()? else { return None };
+        // C4, C8 and CC are tables, all others of this row are frames.
+        if (0xc0..=0xcf).contains(&marker) && ![0xc4, 0xc8, 0xcc].contains(&marker) {
+            let &[_, h, e, w, i, channels] = body.first_chunk()?;
+            return Some((channels, u16::from_be_bytes([h, e]), u16::from_be_bytes([w, i])));
         }
-        let length = u16::from_be_bytes(*after.first_chunk()?);
-        rest = after.get(usize::from(length)..)?;
+        rest = body.get(usize::from(u16::from_be_bytes([high, low])).checked_sub(2)?..)?;
     }
+}
+
+/// How many channels it has.
+pub fn channels(bytes: &[u8]) -> Option<u8> {
+    frame(bytes).map(|(channels, ..)| channels)
+}
+
+/// Pixels across and down.
+pub fn size(bytes: &[u8]) -> Option<(u32, u32)> {
+    frame(bytes).map(|(_, height, width)| (width.into(), height.into()))
 }
 
 #[cfg(test)]
@@ -71,8 +87,23 @@ mod tests {
         let whole = jpeg();
         let thumbnail = [&b"\xff\xe1\0\x08\xff\xd8\xff\xd9\0\0"[..], &whole[2..]].concat();
         let with_thumbnail = [&whole[..2], &thumbnail].concat();
-        assert!(!is_cut_short(&with_thumbnail));
-        assert!(is_cut_short(&with_thumbnail[..with_thumbnail.len() / 2]));
-        assert!(!is_cut_short(&[&whole[..], b"of a phone"].concat()));
+        assert!(is_whole(&with_thumbnail));
+        assert!(!is_whole(&with_thumbnail[..with_thumbnail.len() / 2]));
+        assert!(is_whole(&[&whole[..], b"of a phone"].concat()));
+    }
+
+    #[test]
+    fn the_end_is_found_behind_the_scans_and_not_in_the_segments() {
+        let whole = [
+            &b"\xff\xd8\xff\xe1\0\x06\xff\xd9xx"[..],
+            b"\xff\xda\0\x04ab scan \xff\0\xff\xd0 scan",
+            b"\xff\xff\xc4\0\x03a\xff\xda\0\x02more\xff\xd9rest",
+        ];
+        let bytes = whole.concat();
+        assert!(is_whole(&bytes));
+        let end = bytes.windows(6).position(|six| six == b"more\xff\xd9").unwrap() + 6;
+        for cut in 0..bytes.len() {
+            assert_eq!(is_whole(&bytes[..cut]), cut >= end, "{cut}");
+        }
     }
 }

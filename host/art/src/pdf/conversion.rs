@@ -14,13 +14,11 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-use moxcms::{
-    ColorProfile, DataColorSpace, LutDataType, LutStore, LutType, LutWarehouse, Matrix3d, ProfileClass,
-};
 use palette::chromatic_adaptation::AdaptFromUnclamped;
 use palette::convert::FromColorUnclamped;
 use palette::white_point::{D50, D65};
 use palette::{Lab, LinSrgb, Srgb, Xyz};
+use readers::profile::{self, Table};
 
 /// Nodes on each axis of the table from CMYK, at whole steps of 8 bits, and of that to CMYK.
 const NODES: usize = 16;
@@ -40,15 +38,12 @@ const PICTURES: &str = "Image_CMYK default_cmyk.icc 1 1 0 0\n";
 /// # Errors
 /// Those of writing.
 pub fn write(folder: &Path) -> io::Result<()> {
-    let mut profile = inks().encode().map_err(io::Error::other)?;
-    // Version 4 has another black in some intents; for these tables version 2 differs in its number alone.
-    profile[8..12].copy_from_slice(&[2, 0x40, 0, 0]);
-    fs::write(folder.join("inks.icc"), profile)?;
+    fs::write(folder.join("inks.icc"), inks()?)?;
     fs::write(folder.join("conversions"), PICTURES)
 }
 
 /// The profile of a printer that prints inks.
-fn inks() -> ColorProfile {
+fn inks() -> io::Result<Vec<u8>> {
     let part = |node: usize, nodes: usize| node as f64 / (nodes - 1) as f64;
     // Red, green and blue of all nodes are nodes, too.
     let colours: Vec<[u16; 3]> =
@@ -63,17 +58,12 @@ fn inks() -> ColorProfile {
         let [r, g, b] = rgb;
         [light - r, light - g, light - b, 1.0 - light].map(|ink| (ink * WHOLE).round() as u16)
     });
-    let mut profile = ColorProfile::default();
-    profile.profile_class = ProfileClass::OutputDevice;
-    profile.color_space = DataColorSpace::Cmyk;
-    profile.pcs = DataColorSpace::Lab;
-    profile.white_point = ColorProfile::new_srgb().white_point;
-    profile.media_white_point = Some(profile.white_point);
     let (taking, whole) = (curve(taken), curve(|part| part));
-    profile.lut_a_to_b_perceptual = Some(table([4, 3], NODES, to_lab.collect(), [&taking, &whole]));
     let inking = curve(|taken| 1.0 - light(1.0 - taken));
-    profile.lut_b_to_a_perceptual = Some(table([3, 4], NODES_OF_LAB, from_lab.collect(), [&whole, &inking]));
-    profile
+    profile::printer(
+        table([4, 3], NODES, to_lab.collect(), [taking, whole.clone()]),
+        table([3, 4], NODES_OF_LAB, from_lab.collect(), [whole, inking]),
+    )
 }
 
 /// All nodes of a table, the last axis first.
@@ -97,21 +87,9 @@ fn curve(at: impl Fn(f64) -> f64) -> Vec<u16> {
     (0..ENTRIES).map(|n| (at(n as f64 / (ENTRIES - 1) as f64) * WHOLE).round() as u16).collect()
 }
 
-/// A table of 16 bits between curves of [`ENTRIES`].
-fn table([from, to]: [u8; 2], nodes: usize, values: Vec<u16>, [before, after]: [&[u16]; 2]) -> LutWarehouse {
-    let all = |curve: &[u16], channels: u8| LutStore::Store16(curve.repeat(channels.into()));
-    LutWarehouse::Lut(LutDataType {
-        num_input_channels: from,
-        num_output_channels: to,
-        num_clut_grid_points: nodes as u8,
-        matrix: Matrix3d::IDENTITY,
-        num_input_table_entries: ENTRIES as u16,
-        num_output_table_entries: ENTRIES as u16,
-        input_table: all(before, from),
-        clut_table: LutStore::Store16(values),
-        output_table: all(after, to),
-        lut_type: LutType::Lut16,
-    })
+/// A table of so many nodes on each axis.
+fn table(channels: [u8; 2], nodes: usize, values: Vec<u16>, curves: [Vec<u16>; 2]) -> Table {
+    Table { channels, nodes: nodes as u8, values, curves }
 }
 
 const WHOLE: f64 = u16::MAX as f64;

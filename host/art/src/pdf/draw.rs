@@ -10,11 +10,10 @@ use std::io::{BufReader, Read as _};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use super::super::coverage;
+use super::super::coverage::Scan;
 use super::super::error::{io, no_program, wrong};
 use super::super::names::stem;
-use super::super::object_type;
-use super::super::size::check_pixels;
+use super::super::{file, object_type};
 use super::eps::{self, Bounds};
 use super::ghostscript::{self, Interpreter};
 use super::{complaint, conversion};
@@ -142,7 +141,7 @@ pub(super) fn tagged(
     let (width, height) = object_type::header(&mut file).ok().flatten().ok_or_else(damaged)?;
     let side = |pixels: usize| u32::try_from(pixels).map_err(|_| damaged());
     let size = (side(width)?, side(height)?);
-    check_pixels(path, size.0, size.1)?;
+    file::PICTURE.check(path, size)?;
     let mut pixels = vec![0; object_type::BYTES * width * height];
     file.read_exact(&mut pixels).map_err(io(path, "read its page"))?;
     let order = ghostscript::order(&pixels).map_err(|error| failed(path, error))?;
@@ -209,11 +208,11 @@ fn leaves(
     let mut leaves = Vec::new();
     for number in only.map_or(1..=u32::MAX, |number| number..=number) {
         let draft = place(number);
-        let Ok((width, height)) = image::image_dimensions(&draft) else { break };
+        let Some((width, height)) = file::size(&draft) else { break };
         let (mut drawn, mut spots) = (false, Vec::new());
-        for (name, file) in plates.remove(&stem(&draft)).unwrap_or_default() {
+        for (name, plate) in plates.remove(&stem(&draft)).unwrap_or_default() {
             // A page paints every pixel it touches, so a draft misses nothing.
-            if coverage::scan(&file, None)?.coverage.iter().any(|&c| c > 0) {
+            if Scan::of_picture(file::picture(&plate, None)?).coverage.iter().any(|&c| c > 0) {
                 drawn = true;
                 if !PROCESS.contains(&name.as_str()) {
                     spots.push(name);

@@ -22,14 +22,14 @@ use protocol::ink::{Ink, Kind};
 use rayon::prelude::*;
 
 use super::super::artwork::Artwork;
-use super::super::coverage::{self, Coverage, Scan};
+use super::super::coverage::{Coverage, Scan};
 use super::super::cut_lines;
 use super::super::error::{NamedPart, io, unknown_ink, wrong};
 use super::super::names::{self, Named};
 use super::super::options::Options;
 use super::super::size;
 use super::super::window::Window;
-use super::super::{object_type, picture};
+use super::super::{file, object_type, picture};
 use super::conversion;
 use super::draw::{PROCESS, Part, Tagged, drafts, plates_beside, separate, tagged};
 use super::ghostscript::Interpreter;
@@ -153,12 +153,11 @@ pub(super) fn separated_part(
     let folder = Scratch::new().map_err(io(path, "make a folder for its plates"))?;
     let full = folder.path().join("page.tif");
     let said = separate((path, interpreter), page, part, dpi, &full, false)?;
-    let (width, height) =
-        image::image_dimensions(&full).map_err(|_| wrong(path, format!("there is no page {page}")))?;
+    let (width, height) = file::size(&full).ok_or_else(|| wrong(path, format!("there is no page {page}")))?;
     let (mut plates, mut notes) = (Vec::new(), Vec::new());
     let (mut process, mut others, mut cuts) = (Vec::new(), Vec::new(), Vec::new());
-    for (plate, file) in plates_beside(&full, &folder)? {
-        let scan = coverage::scan(&file, None)?;
+    for (plate, plate_file) in plates_beside(&full, &folder)? {
+        let scan = Scan::of_picture(file::picture(&plate_file, None)?);
         if (scan.width, scan.height) != (width, height) {
             return Err(wrong(path, format!("plate {plate} of page {page} differs in size from the page")));
         }
@@ -255,8 +254,8 @@ fn kept(
     process: &[(String, Vec<u8>)],
     again: &[(String, PathBuf)],
 ) -> Result<Option<Vec<u8>>, Diagnosis> {
-    let Some((_, file)) = again.iter().find(|(name, _)| name == plate) else { return Ok(None) };
-    let mut whole = coverage::scan(file, None)?.coverage;
+    let Some((_, again)) = again.iter().find(|(name, _)| name == plate) else { return Ok(None) };
+    let mut whole = Scan::of_picture(file::picture(again, None)?).coverage;
     if whole.len() != white.len() {
         return Ok(None);
     }

@@ -14,12 +14,10 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use image::{ImageError, ImageFormat};
 use percent_encoding::percent_decode_str;
-use readers::{Bounds, Opened};
+use readers::Flaw;
 use resvg::usvg::{ImageHrefResolver, ImageKind};
 
-use super::super::decode::whole_jpeg;
 use super::render::Without;
 use super::{MOST_BYTES, bounds, source};
 
@@ -146,34 +144,18 @@ fn drawable(path: &Path, bytes: &[u8], met: &Mutex<Met>) -> Result<Option<Arc<Ve
 
 /// Why a picture made of pixels cannot be drawn to its end; the renderer leaves it out in silence.
 fn fault(picture: &ImageKind, known: &Known) -> Option<&'static str> {
-    let (bytes, format) = match picture {
-        ImageKind::JPEG(bytes) => (bytes, ImageFormat::Jpeg),
-        ImageKind::PNG(bytes) => (bytes, ImageFormat::Png),
-        ImageKind::GIF(bytes) => (bytes, ImageFormat::Gif),
-        ImageKind::WEBP(bytes) => (bytes, ImageFormat::WebP),
-        ImageKind::SVG(_) => return None,
+    let (ImageKind::JPEG(bytes) | ImageKind::PNG(bytes) | ImageKind::GIF(bytes) | ImageKind::WEBP(bytes)) =
+        picture
+    else {
+        return None;
     };
     let mut hasher = DefaultHasher::new();
     bytes.hash(&mut hasher);
     let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
     *known.entry(hasher.finish()).or_insert_with(|| {
-        const DAMAGED: &str = "is damaged or was cut short, so save it again";
-        if format == ImageFormat::Jpeg && whole_jpeg(Path::new(""), bytes).is_err() {
-            return Some(DAMAGED);
-        }
-        const LARGE: &str = "has too many pixels";
-        let opened = match readers::open(bytes, format, Bounds { side: None, bytes: 8 * MOST_PIXELS }) {
-            Ok(opened) => opened,
-            Err(ImageError::Limits(_)) => return Some(LARGE),
-            Err(_) => return Some(DAMAGED),
-        };
-        let (width, height) = opened.size();
-        if u64::from(width) * u64::from(height) > MOST_PIXELS {
-            return Some(LARGE);
-        }
-        match Opened::decode(opened) {
-            Ok(_) | Err(ImageError::Unsupported(_)) => None,
-            Err(_) => Some(DAMAGED),
-        }
+        readers::flaw(bytes, MOST_PIXELS).map(|flaw| match flaw {
+            Flaw::Damaged => "is damaged or was cut short, so save it again",
+            Flaw::Large => "has too many pixels",
+        })
     })
 }

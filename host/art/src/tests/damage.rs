@@ -37,7 +37,7 @@ fn a_jpeg_that_was_cut_short_is_refused_as_a_layer_as_colour_and_as_plates() {
     for (name, bytes) in [
         ("white.jpg", whole.get_ref().as_slice()),
         ("photo.jpg", whole.get_ref()),
-        ("plates.jpg", include_bytes!("../cmyk.jpg")),
+        ("plates.jpg", include_bytes!("../../../readers/src/cmyk.jpg")),
     ] {
         let options = Options { dpi: Some(600.0), ..Options::default() };
         read(&[bench.write(name, bytes)], &options);

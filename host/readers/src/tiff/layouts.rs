@@ -6,22 +6,24 @@
 //! Method: the file is marked as greyscale in memory, for which the decoder returns all channels as they are stored; colours are
 //! converted here. A channel beside the colours that is not named and not empty is transparency. Where colours were multiplied with
 //! it, they are divided. Cost: four bytes a pixel, one for each channel. Limits: 8 and 16 bits a channel, less for palettes and grey;
-//! one page ([`tiff_pages`](super::tiff_pages)); YCbCr only as JPEG.
+//! one page ([`pages`](super::pages)); YCbCr only as JPEG.
 //! Source: TIFF 6.0, sections 5, 8, 18, 21 to 23; TIFF Technical Note 4 for ICC Lab; IEC 61966-2-1 and CIE 15 by the crate `palette`.
 
 use std::path::Path;
 
 use ::tiff::decoder::DecodingResult;
 use ::tiff::tags::Tag;
-use image::{DynamicImage, GrayImage, RgbaImage};
+use image::ImageFormat;
 use observe::Diagnosis;
 use palette::convert::FromColorUnclamped;
 use palette::{Lab, Srgb, white_point::D50};
 use rayon::prelude::*;
-use readers::resolution::{TiffDecoder, tiff_decoder};
 
-use super::error::wrong;
-use super::tiff;
+use super::channels::{self, PROFILE};
+use crate::picture::{Picture, Raster};
+use crate::read::{Request, reduced};
+use crate::resolution::{TiffDecoder, of_file, tiff_decoder};
+use crate::turn::Turn;
 
 /// Values of the photometric tag.
 const WHITE_IS_ZERO: u16 = 0;
@@ -50,13 +52,6 @@ const COMPRESSIONS: [(u16, &str); 12] = [
     (50_002, "JPEG XL"),
     (34_887, "LERC"),
 ];
-
-/// A picture, what to tell of it, and whether its profile is for colours that it no longer has.
-pub(super) struct Read {
-    pub image: DynamicImage,
-    pub notes: Vec<String>,
-    pub converted: bool,
-}
 
 /// What a file says of its pixels.
 struct About {
@@ -102,24 +97,26 @@ impl About {
 }
 
 /// Reads a picture of one of these kinds; `None` if the usual decoder reads it.
-pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Option<Read>, Diagnosis> {
+pub(crate) fn read(bytes: &[u8], name: &Path, request: &Request<'_>) -> Result<Option<Picture>, Diagnosis> {
     let Some(mut decoder) = tiff_decoder(bytes) else { return Ok(None) };
     let Some(about) = About::of(&mut decoder) else { return Ok(None) };
     let Some(colours) = about.colours() else { return Ok(None) };
-    super::size::check_pixels(path, about.size.0, about.size.1)?;
+    request.check(name, about.size)?;
     let map = decoder.find_tag(Tag::ColorMap).ok().flatten().and_then(|map| map.into_u16_vec().ok());
+    let turn = Turn::of_tag(decoder.find_tag_unsigned(Tag::Orientation).ok().flatten());
+    let profile = decoder.find_tag(PROFILE).ok().flatten().and_then(|value| value.into_u8_vec().ok());
     drop(decoder);
     let mut grey = bytes.to_vec();
-    tiff::set_photometric(&mut grey);
+    channels::set_photometric(&mut grey);
     let pixels = about.size.0 as usize * about.size.1 as usize;
     let planes = if about.bits < 8 {
-        vec![unpacked(path, &grey, &about)?]
+        vec![unpacked(name, &grey, &about)?]
     } else {
-        tiff::planes(path, &grey, about.samples, pixels)?
+        channels::planes(name, &grey, about.samples, pixels)?
     };
     let mut notes = Vec::new();
     if about.bits == 16 {
-        notes.push(format!("{}: 16 bits per channel are reduced to 8", path.display()));
+        notes.push(reduced(name));
     }
     // A channel that is empty everywhere would make the whole picture transparent.
     let unnamed = !matches!(about.extra, Some(1 | 2));
@@ -127,27 +124,20 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Option<Read>, Diagnosis>
     if opacity.is_some_and(|plane| unnamed && plane.iter().any(|&v| v < 255)) {
         notes.push(format!(
             "{}: its channel {} of {} has no name; it is read as transparency",
-            path.display(),
+            name.display(),
             colours + 1,
             about.samples
         ));
     }
-    if about.photometric <= BLACK_IS_ZERO && opacity.is_none() {
-        // Grey of few bits is spread over all values.
-        let most = (1u32 << about.bits.min(8)) - 1;
-        let value = |&v: &u8| {
-            let v = (u32::from(v) * 255 / most) as u8;
-            if about.photometric == WHITE_IS_ZERO { 255 - v } else { v }
-        };
-        let grey = GrayImage::from_raw(about.size.0, about.size.1, planes[0].iter().map(value).collect());
-        return Ok(grey.map(|grey| Read { image: grey.into(), notes, converted: false }));
-    }
     let palette = map.unwrap_or_default();
     let entries = palette.len() / 3;
     if about.photometric == PALETTE && entries == 0 {
-        return Err(wrong(path, "it has no palette").hint("save it in RGB"));
+        return Err(Diagnosis::of_file(name, "it has no palette").hint("save it in RGB"));
     }
-    let channel = |c: usize, at: usize| planes.get(c).map_or(0, |plane| plane[at]);
+    // Grey of few bits is spread over all values.
+    let most = if about.photometric <= BLACK_IS_ZERO { (1u32 << about.bits.min(8)) - 1 } else { 255 };
+    let channel =
+        |c: usize, at: usize| planes.get(c).map_or(0, |plane| (u32::from(plane[at]) * 255 / most) as u8);
     let colour = |at: usize| -> [u8; 3] {
         let own = [channel(0, at), channel(1, at), channel(2, at)];
         match about.photometric {
@@ -164,34 +154,47 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Option<Read>, Diagnosis>
         }
     };
     let multiplied = about.extra == Some(1);
-    let rgba: Vec<u8> = (0..pixels)
-        .into_par_iter()
-        .flat_map_iter(|at| {
-            let alpha = opacity.map_or(255, |plane| plane[at]);
-            let divided = |v: u8| match alpha {
-                1.. if multiplied => (u32::from(v) * 255 / u32::from(alpha)).min(255) as u8,
-                _ => v,
-            };
-            let [r, g, b] = colour(at).map(divided);
-            [r, g, b, alpha]
-        })
-        .collect();
-    let converted = matches!(about.photometric, LAB | ICC_LAB);
-    let image = RgbaImage::from_raw(about.size.0, about.size.1, rgba);
-    let image = image.map(|image| match (opacity, about.photometric) {
-        (None, _) => DynamicImage::from(DynamicImage::from(image).into_rgb8()),
-        (Some(_), ..=BLACK_IS_ZERO) => DynamicImage::from(image).into_luma_alpha8().into(),
-        _ => image.into(),
+    let pixel = |at: usize| {
+        let alpha = opacity.map_or(255, |plane| plane[at]);
+        let divided = |v: u8| match alpha {
+            1.. if multiplied => (u32::from(v) * 255 / u32::from(alpha)).min(255) as u8,
+            _ => v,
+        };
+        let [r, g, b] = colour(at).map(divided);
+        [r, g, b, alpha]
+    };
+    let channels = if about.photometric <= BLACK_IS_ZERO { 1 } else { 3 } + usize::from(opacity.is_some());
+    let samples = (0..pixels).into_par_iter().flat_map_iter(|at| {
+        let [r, g, b, alpha] = pixel(at);
+        match channels {
+            1 => [r, 0, 0, 0],
+            2 => [r, alpha, 0, 0],
+            _ => [r, g, b, alpha],
+        }
+        .into_iter()
+        .take(channels)
     });
-    Ok(image.map(|image| Read { image, notes, converted }))
+    let colours = turn.raster(Raster { channels, samples: samples.collect() }, about.size);
+    // Colours that were converted are no longer those of the profile.
+    let converted = matches!(about.photometric, LAB | ICC_LAB);
+    Ok(Some(Picture {
+        name: name.into(),
+        size: turn.size(about.size),
+        planes: Vec::new(),
+        colours: Some(colours),
+        resolution: turn.dpi(of_file(bytes, ImageFormat::Tiff)),
+        profile: profile.filter(|_| !converted),
+        gamma: None,
+        notes,
+    }))
 }
 
 /// Values of less than a byte; each row begins with a byte of its own.
-fn unpacked(path: &Path, bytes: &[u8], about: &About) -> Result<Vec<u8>, Diagnosis> {
-    let damaged = || wrong(path, "the file is damaged");
+fn unpacked(name: &Path, bytes: &[u8], about: &About) -> Result<Vec<u8>, Diagnosis> {
+    let damaged = || Diagnosis::of_file(name, "the file is damaged");
     let mut decoder = tiff_decoder(bytes).ok_or_else(damaged)?;
     let mut decoded = DecodingResult::U8(Vec::new());
-    decoder.read_image_to_buffer(&mut decoded).map_err(|error| refused(path, bytes, &error))?;
+    decoder.read_image_to_buffer(&mut decoded).map_err(|error| refused(name, bytes, &error))?;
     let DecodingResult::U8(packed) = decoded else { return Err(damaged()) };
     let (width, bits) = (about.size.0 as usize, usize::from(about.bits));
     let stride = (width * bits).div_ceil(8);
@@ -203,14 +206,14 @@ fn unpacked(path: &Path, bytes: &[u8], about: &About) -> Result<Vec<u8>, Diagnos
 }
 
 /// Why a TIFF cannot be decoded, in words for its owner.
-pub(super) fn refused(path: &Path, bytes: &[u8], error: &dyn std::fmt::Display) -> Diagnosis {
+pub(crate) fn refused(name: &Path, bytes: &[u8], error: &dyn std::fmt::Display) -> Diagnosis {
     let about = tiff_decoder(bytes).and_then(|mut decoder| About::of(&mut decoder));
     let compressed = about.as_ref().and_then(|about| {
-        COMPRESSIONS.iter().find(|(value, _)| *value == about.compression).map(|(_, name)| *name)
+        COMPRESSIONS.iter().find(|(value, _)| *value == about.compression).map(|(_, kind)| *kind)
     });
     let hint = "save it in RGB or grey with 8 bits a channel, uncompressed or with LZW or ZIP compression";
     let problem = match (compressed, about) {
-        (Some(name), _) => format!("it is compressed with {name}, which is not read"),
+        (Some(kind), _) => format!("it is compressed with {kind}, which is not read"),
         (None, Some(about)) => format!(
             "its pixels are not read: {} of {} bits, {} ({error})",
             match about.samples {
@@ -230,11 +233,11 @@ pub(super) fn refused(path: &Path, bytes: &[u8], error: &dyn std::fmt::Display) 
         ),
         (None, None) => format!("cannot decode the picture: {error}"),
     };
-    wrong(path, problem).hint(hint)
+    Diagnosis::of_file(name, problem).hint(hint)
 }
 
 /// Why a TIFF whose data end too early cannot be decoded although all of them are in the file; `None` if they are not.
-pub(super) fn ended(path: &Path, bytes: &[u8]) -> Option<Diagnosis> {
+pub(crate) fn ended(name: &Path, bytes: &[u8]) -> Option<Diagnosis> {
     let mut decoder = tiff_decoder(bytes)?;
     let about = About::of(&mut decoder)?;
     let mut all = |tag| decoder.find_tag(tag).ok().flatten()?.into_u64_vec().ok();
@@ -253,7 +256,7 @@ pub(super) fn ended(path: &Path, bytes: &[u8]) -> Option<Diagnosis> {
         _ => "compressed",
     };
     let problem = format!("its {kind} data are all there but cannot be read to their end");
-    Some(wrong(path, problem).hint("save it as PNG, or as TIFF without compression"))
+    Some(Diagnosis::of_file(name, problem).hint("save it as PNG, or as TIFF without compression"))
 }
 
 /// The colour of JPEG's components, by JFIF.

@@ -10,15 +10,16 @@
 use std::ops::Range;
 use std::path::Path;
 
-use super::error::{several_pages, wrong};
-use crate::process::MOST_PAGES;
 use observe::Diagnosis;
+
+/// The most pages that are looked for.
+const MOST_PAGES: usize = 1000;
 
 const NEW_SUBFILE_TYPE: u16 = 254;
 const SUBFILE_TYPE: u16 = 255;
 
 /// Whether these are the first bytes of a TIFF, or of one with places of eight bytes (BigTIFF).
-pub(super) fn is_tiff(start: &[u8]) -> bool {
+pub fn is_tiff(start: &[u8]) -> bool {
     [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"].iter().any(|magic| start.starts_with(*magic))
 }
 
@@ -89,7 +90,7 @@ impl Numbers<'_> {
 }
 
 /// The place of a tag's value in the first picture, for values of bytes and 16-bit numbers.
-pub(super) fn field(bytes: &[u8], tag: u16) -> Option<Range<usize>> {
+pub(crate) fn field(bytes: &[u8], tag: u16) -> Option<Range<usize>> {
     let numbers = Numbers::of(bytes);
     let (mut entries, _) = numbers.entries(numbers.place(numbers.first())?)?;
     let entry = entries.find(|&at| numbers.short(at) == Some(tag))?;
@@ -116,7 +117,7 @@ fn directories(bytes: &[u8]) -> Vec<usize> {
         } else {
             pages.push(directory);
         }
-        if pages.len() + copies.len() > MOST_PAGES as usize {
+        if pages.len() + copies.len() > MOST_PAGES {
             break;
         }
         next = numbers.place(after);
@@ -124,31 +125,27 @@ fn directories(bytes: &[u8]) -> Vec<usize> {
     if pages.is_empty() { copies } else { pages }
 }
 
-/// How many pages there are; none in a damaged file.
-pub(super) fn count(bytes: &[u8]) -> usize {
+/// How many pages a TIFF has; none in a damaged file.
+pub fn count(bytes: &[u8]) -> usize {
     directories(bytes).len()
 }
 
-/// Makes a page the first picture of the file in memory: the one of this number, or the only one.
+/// Makes a page the first picture of the file in memory: the one of this number, else the first that is no copy.
 ///
 /// # Errors
-/// Several pages and no number, or no page of this number.
-pub(super) fn choose(path: &Path, bytes: &mut [u8], page: Option<u32>) -> Result<(), Diagnosis> {
+/// No page of this number.
+pub(crate) fn choose(name: &Path, bytes: &mut [u8], page: Option<u32>) -> Result<(), Diagnosis> {
     let pages = directories(bytes);
     if pages.is_empty() {
         return Ok(());
     }
     let at = match page {
-        None if pages.len() == 1 => 0,
-        None => {
-            let pages: Vec<u32> = (1..).take(pages.len()).collect();
-            return Err(several_pages(path, &pages));
-        }
+        None => 0,
         Some(number) => number.checked_sub(1).map_or(usize::MAX, |at| at as usize),
     };
     let Some(&directory) = pages.get(at) else {
         let (number, pages) = (page.unwrap_or_default(), pages.len());
-        return Err(wrong(path, format!("there is no page {number}; the file has {pages}")));
+        return Err(Diagnosis::of_file(name, format!("there is no page {number}; the file has {pages}")));
     };
     // Every place was read as a number of so many bytes.
     let Numbers { little, big, .. } = Numbers::of(bytes);

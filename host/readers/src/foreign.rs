@@ -58,7 +58,7 @@ const MAGIC: [(usize, &[u8], Format); 29] = [
 ];
 
 /// What these first bytes of a file are, if they are of a format that is known but not read.
-pub(super) fn format(start: &[u8]) -> Option<Format> {
+pub(crate) fn known(start: &[u8]) -> Option<Format> {
     let at = |place: usize, magic: &[u8]| start.get(place..).is_some_and(|rest| rest.starts_with(magic));
     let known = MAGIC.iter().find(|(place, magic, _)| at(*place, magic)).map(|(.., format)| *format);
     known.or_else(|| archive(start)).or_else(|| text(start))
@@ -117,12 +117,12 @@ mod tests {
             (b"\0\xffKA\x0b\0", "Affinity's own format"),
             (b"\n<!DOCTYPE HTML>", "a page of the web"),
         ] {
-            let (found, way) = format(start).unwrap();
+            let (found, way) = known(start).unwrap();
             assert_eq!(found, name);
             assert!(["export", "save", "print", "unpack"].iter().any(|verb| way.starts_with(verb)), "{way}");
         }
         for start in [&b"\x89PNG\r\n"[..], b"RIFF\x10\0\0\0WEBP", b"<svg>", b"%PDF-1.4", b"", b"0 0 0"] {
-            assert_eq!(format(start), None);
+            assert_eq!(known(start), None);
         }
     }
 }

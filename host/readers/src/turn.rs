@@ -9,11 +9,12 @@
 use image::metadata::Orientation;
 use rayon::prelude::*;
 
-use readers::resolution::Dpi;
+use crate::picture::Raster;
+use crate::resolution::Dpi;
 
 /// How to turn the pixels of a file before they are shown.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct Turn(pub Orientation);
+pub(crate) struct Turn(pub Orientation);
 
 impl Turn {
     /// As EXIF data state.
@@ -68,6 +69,23 @@ impl Turn {
             }
         });
         turned
+    }
+}
+
+impl Turn {
+    /// Turns colours; `size` is that before the turn.
+    pub fn raster(self, raster: Raster, size: (u32, u32)) -> Raster {
+        if self.0 == Orientation::NoTransforms {
+            return raster;
+        }
+        let channels = raster.channels;
+        let mut samples = vec![0; raster.samples.len()];
+        for c in 0..channels {
+            let plane = raster.samples.iter().skip(c).step_by(channels).copied().collect();
+            let turned = self.plane(plane, size);
+            samples.iter_mut().skip(c).step_by(channels).zip(turned).for_each(|(sample, v)| *sample = v);
+        }
+        Raster { channels, samples }
     }
 }
 
