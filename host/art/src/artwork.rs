@@ -7,12 +7,15 @@
 use protocol::ink::{Ink, Kind};
 use rayon::prelude::*;
 
-use super::colour::Colour;
-use super::coverage::{Coverage, Scan};
-use super::edges::Edges;
-use super::key::{colour, key};
-use super::options::Options;
-use super::{bitplane, names, resample, trace};
+use crate::colour::Colour;
+use crate::colour::packed::{colour, key};
+use crate::dots::bitplane;
+use crate::dots::edges::Edges;
+use crate::dots::resample;
+use crate::dots::trace;
+use crate::options::Options;
+use crate::read::coverage::{Coverage, Scan};
+use crate::read::names;
 use sheet::Plane;
 
 /// Least coverage of a dot that is ink.

@@ -1,9 +1,16 @@
 //! Plain colour to the process inks: a picture is a matte document.
 //!
 //! Problem: a page has thirty million dots, white must stay bare paper, and letters must stay whole.
-//! Method: [`fine`] picks each dot's stack by the dot's own colour, whose mixture a [`Fit`] knows. Other halftones need more than a
+//! Method: [`screen`] picks each dot's stack by the dot's own colour, whose mixture a [`Fit`] knows. Other halftones need more than a
 //! dot: for them `tones` averages the colours. A page in black and white has its stacks already.
 //! Cost: that of the halftone; a page in black and white costs nothing. Limits: those of `fit`.
+
+pub(crate) mod fit;
+pub(crate) mod intent;
+pub(crate) mod lattice;
+pub(crate) mod packed;
+pub(crate) mod solids;
+pub(crate) mod tetrahedra;
 
 use std::ops::Range;
 
@@ -11,17 +18,17 @@ use inks::{InkSet, Library, Stack};
 use protocol::ink::Ink;
 use rayon::prelude::*;
 
-use super::bitplane;
-use super::error::{no_cluster, not_halftoned};
-use super::fine;
-use super::fit::{Fit, Wishes};
-use super::intent::Intent;
-use super::key::{BLACK, Key, LABEL, WHITE, colour as colour_of, of_drawn};
-use super::lattice::ends;
-use super::object_type::{ObjectType, split};
-use super::pixels::{Pixels, Rows};
-use super::solids::Solids;
-use super::tones;
+use crate::colour::fit::{Fit, Wishes};
+use crate::colour::intent::Intent;
+use crate::colour::lattice::ends;
+use crate::colour::packed::{BLACK, Key, LABEL, WHITE, colour as colour_of, of_drawn};
+use crate::colour::solids::Solids;
+use crate::dots::bitplane;
+use crate::dots::pixels::{Pixels, Rows};
+use crate::dots::screen;
+use crate::dots::tones;
+use crate::error::{no_cluster, not_halftoned};
+use crate::read::object_type::{ObjectType, split};
 use appearance::brdf::Space;
 use appearance::document::SAMPLES;
 use appearance::gamut::Printable;
@@ -39,7 +46,7 @@ const BLOCK: usize = 32;
 pub struct Colour {
     drawn: Drawn,
     /// Whether the colours are printed on dots of layers, too; an ink of a layer otherwise has its dots to itself.
-    pub(super) overprints: bool,
+    pub(crate) overprints: bool,
 }
 
 /// What has the colours.
@@ -91,7 +98,7 @@ impl Drew {
 }
 
 /// The dots of the process inks.
-pub(super) struct Picked {
+pub(crate) struct Picked {
     pub planes: Vec<(Ink, Plane)>,
     /// The number of each dot's stack, and for each number the planes that have it, a bit each; `None` for black alone.
     pub stacks: Option<(Vec<u8>, [u16; 256])>,
@@ -99,7 +106,7 @@ pub(super) struct Picked {
 
 /// How the colours become dots.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct How {
+pub(crate) struct How {
     pub intent: Intent,
     pub gamma: f64,
     pub halftone: Method,
@@ -109,12 +116,12 @@ pub(super) struct How {
 
 impl Colour {
     /// Black dots on white.
-    pub(super) fn black(dots: Plane) -> Colour {
+    pub(crate) fn black(dots: Plane) -> Colour {
         Colour { drawn: Drawn::Black(dots), overprints: false }
     }
 
     /// Rows of `width` dots in these colours, a number each; `None` if all are white.
-    pub(super) fn numbered(
+    pub(crate) fn numbered(
         colours: Vec<(ObjectType, [u8; 3])>,
         index: Vec<u8>,
         width: usize,
@@ -142,7 +149,7 @@ impl Colour {
     }
 
     /// The colours of pixels of three bytes, or of four with a tag before them; `None` if all are white.
-    pub(super) fn of_pixels<const N: usize>(bytes: Vec<u8>, size: (u32, u32)) -> Option<Colour> {
+    pub(crate) fn of_pixels<const N: usize>(bytes: Vec<u8>, size: (u32, u32)) -> Option<Colour> {
         let parts = bytes.as_chunks::<N>().0.par_chunks(1 << 12).map(Drew::of);
         let drew = parts.reduce(Drew::default, Drew::and);
         let pixels = Pixels { bytes, each: N, width: size.0 as usize, height: size.1 as usize };
@@ -150,7 +157,7 @@ impl Colour {
     }
 
     /// What writes the colours of rows of so many dots; `labels` says whether text is a label.
-    pub(super) fn rows(&self, dots: (usize, usize), labels: bool) -> Box<Rows<'_>> {
+    pub(crate) fn rows(&self, dots: (usize, usize), labels: bool) -> Box<Rows<'_>> {
         let of_rows = move |rows: Range<usize>| rows.start * dots.0..rows.end * dots.0;
         match &self.drawn {
             Drawn::Black(plane) => Box::new(move |rows, out| {
@@ -179,7 +186,7 @@ impl Colour {
     }
 
     /// The dots of the process inks that the colours need.
-    pub(super) fn picked(
+    pub(crate) fn picked(
         &self,
         dots: (usize, usize),
         inks: &InkSet,
@@ -224,7 +231,7 @@ impl Colour {
         let rows = self.rows(dots, how.labels);
         if how.halftone == Method::Fine {
             let table = Table::for_cluster(largest_cluster(inks, library)?);
-            let index = fine::dots(rows, dots, &fit, &solids, table);
+            let index = screen::dots(rows, dots, &fit, &solids, table);
             return Ok((fit.stacks, index));
         }
         let corners: Vec<[u8; 3]> =
@@ -253,7 +260,7 @@ impl Colour {
 
     /// The colour of each of so many dots.
     #[cfg(test)]
-    pub(super) fn keys(&self, dots: (usize, usize)) -> Vec<Key> {
+    pub(crate) fn keys(&self, dots: (usize, usize)) -> Vec<Key> {
         let mut keys = vec![0; dots.0 * dots.1];
         self.rows(dots, false)(0..dots.1, &mut keys);
         keys
@@ -261,7 +268,7 @@ impl Colour {
 }
 
 /// The minimum cluster of the most demanding of these inks.
-pub(super) fn largest_cluster(inks: &InkSet, library: &Library) -> Result<u16, Diagnosis> {
+pub(crate) fn largest_cluster(inks: &InkSet, library: &Library) -> Result<u16, Diagnosis> {
     let cluster = |ink: Ink| Some(library.cartridge(ink)?.minimum_cluster.get());
     inks.iter().try_fold(1, |most, ink| Ok(most.max(cluster(ink).ok_or_else(|| no_cluster(ink))?)))
 }

@@ -19,59 +19,27 @@
 )]
 
 mod artwork;
-mod bitplane;
 mod colour;
-mod compose;
-mod coverage;
-mod cut_lines;
-mod distance;
-mod edges;
+mod dots;
 mod error;
-mod even;
-mod file;
-mod fine;
-mod fit;
-mod indexed_page;
-mod inks_by_name;
-mod intent;
-mod key;
-mod lattice;
-mod layered;
-pub mod names;
-pub mod object_type;
-mod open;
 mod options;
-mod order;
-mod page;
-pub mod pdf;
-mod picture;
-mod pixels;
-pub mod process;
-mod resample;
-mod reserved;
-mod scans;
-mod size;
-mod solids;
-mod svg;
-mod svg_kinds;
-mod tones;
-mod trace;
-mod white;
+mod read;
 mod window;
 
 pub use artwork::{Artwork, Layer, Shape};
 pub use colour::Colour;
-pub use compose::{
+pub use colour::intent::Intent;
+pub use dots::compose::{
     Accept, Composed, Finish, GAMMAS, InkLayer, MOST_CHOKE_MM, Order, Remedy, Report, Settings, Suggestion,
     Text, compose,
 };
-pub use intent::Intent;
-pub use open::{is_art, open};
+pub use dots::trace::Path as CutPath;
+pub use dots::white::White;
 pub use options::{Options, Pages, Room, TOLERANCES};
-pub use page::Page;
-pub use svg::DRAWING;
-pub use trace::Path as CutPath;
-pub use white::White;
+pub use read::open::{is_art, open};
+pub use read::page::Page;
+pub use read::svg::DRAWING;
+pub use read::{names, object_type, pdf, process};
 pub use window::Window;
 
 #[cfg(test)]

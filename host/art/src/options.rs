@@ -29,7 +29,7 @@ pub struct Options {
     pub across: usize,
     /// The inks that reserved colours may stand for.
     pub inks: InkSet,
-    /// Whether lines for a cutter are read as [`Artwork::cuts`](super::Artwork::cuts).
+    /// Whether lines for a cutter are read as [`Artwork::cuts`](crate::Artwork::cuts).
     pub cut_lines: bool,
     /// Whether white keeps the dots that colours drawn over it would knock out.
     pub keep_white: bool,

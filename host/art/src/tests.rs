@@ -20,8 +20,10 @@ mod styles;
 mod thin;
 mod turned;
 
-use super::pdf::Interpreter;
 use super::*;
+use crate::dots::bitplane;
+use crate::read::pdf::Interpreter;
+use crate::read::file;
 use observe::Silent;
 use protocol::ink::Ink;
 use tempfile::TempDir;

@@ -98,7 +98,8 @@ fn pictures_are_shown_the_way_up_that_their_file_states() {
             let (across, down) = (wanted.split('/').next().unwrap().len(), wanted.split('/').count());
             assert_eq!((art.width, art.length), (across * CELL, down * CELL), "{name:?}, {orientation}");
         }
-        let plates = bench.write("plates.jpg", with_exif(include_bytes!("../../../readers/src/cmyk.jpg"), &exif));
+        let plates =
+            bench.write("plates.jpg", with_exif(include_bytes!("../../../readers/src/cmyk.jpg"), &exif));
         let half = HALF[usize::from(orientation) - 1];
         assert_eq!(shown(&read(&[plates], &options), half), half, "plates.jpg, {orientation}");
     }
@@ -127,7 +128,8 @@ fn the_resolution_turns_with_the_picture() {
         let art = read(&[bench.path("white.png")], &Options::default());
         assert_eq!((art.width, art.length), size, "white.png, {orientation}");
         // 16 x 8 pixels.
-        let plates = bench.write("plates.jpg", with_exif(include_bytes!("../../../readers/src/cmyk.jpg"), &exif));
+        let plates =
+            bench.write("plates.jpg", with_exif(include_bytes!("../../../readers/src/cmyk.jpg"), &exif));
         let art = read(&[plates], &Options::default());
         let (long, short) = (32, 8);
         assert_eq!((art.width, art.length), if size.0 == 48 { (long, short) } else { (short, long) });

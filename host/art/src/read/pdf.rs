@@ -1,0 +1,219 @@
+//! PDF and PostScript pages, through Ghostscript as a process.
+//!
+//! Problem: pages have spot plates and transparent backgrounds, and their languages are large. A document has several pages,
+//! and nothing of it may be lost in silence.
+//! Method: drafts of all pages tell which hold art. If several do, the user chooses one, or names an ink for
+//! each. A page with spot colours that name inks is separated at its final number of dots. Any other page is drawn with the
+//! kind of each pixel ([`object_type`](crate::read::object_type)), on a transparent background.
+//! Cost: seconds a page. Limits: a time limit for each page ([`process`](crate::read::process)).
+
+mod complaint;
+pub mod conversion;
+mod draw;
+mod eps;
+mod ghostscript;
+mod optional;
+mod plates;
+
+use std::path::Path;
+
+use protocol::ink::{Ink, Kind};
+
+use crate::artwork::{Artwork, Layer};
+use crate::error::{io, no_dot, nothing, several_pages, wrong};
+use crate::options::{Options, Pages};
+use crate::read::coverage::Scan;
+use crate::read::file;
+use crate::read::names::{self, stem};
+use crate::read::picture;
+use crate::read::size::{self, Unstated};
+use draw::{DRAFT, Drafts, Leaf, Part, Tagged};
+use files::scratch::Scratch;
+use observe::{Diagnosis, Observer};
+use readers::Raster;
+
+pub use complaint::{OLDER, cut_short, damaged, no_page};
+pub use ghostscript::{Interpreter, command, interpreter, order};
+pub use plates::{Separated, Survey, separated, survey};
+
+/// How far from the beginning of a file readers look for the header of a PDF.
+const HEADER: usize = 1024;
+
+/// Whether these are the first bytes of a document for [`read`].
+pub(crate) fn is_document(start: &[u8]) -> bool {
+    is_pdf(start) || start.starts_with(b"%!") || start.starts_with(eps::WITH_PREVIEW)
+}
+
+/// Whether these are the first bytes of a PDF. Spoolers and mail programs write a few lines before its header.
+fn is_pdf(start: &[u8]) -> bool {
+    let other = || {
+        readers::is_picture(start) || start.trim_ascii_start().starts_with(b"<") || start.starts_with(b"%!")
+    };
+    start.starts_with(b"%PDF")
+        || start[..start.len().min(HEADER)].windows(5).any(|word| word == b"%PDF-") && !other()
+}
+
+/// Reads a document.
+pub(crate) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, Diagnosis> {
+    let folder = Scratch::new().map_err(io(path, "make a folder for its pages"))?;
+    let only = options.page();
+    observer.begin("reading pages", 2);
+    let (Drafts { leaves, said }, interpreter) = draw::drafts(path, only, Part::CropBox, &folder)?;
+    observer.advance(1);
+    let first = leaves.first().ok_or_else(|| wrong(path, no_page(&said, only)))?;
+    let document = Document { path, interpreter, folder: &folder, options };
+    let mut art = match &options.pages {
+        Pages::Number(_) => document.page(first)?,
+        Pages::Only => document.only_page(&leaves)?,
+        Pages::Inks(inks) => document.pages_of_inks(&leaves, inks, observer)?,
+    };
+    observer.end();
+    let place = |note: String| format!("{}: {note}", path.display());
+    art.notes.extend(complaint::replaced_fonts(&said).map(place));
+    let spots = art.layers.iter().any(|layer| layer.ink.kind() != Kind::Process);
+    art.notes.extend(optional::notes(path, spots));
+    art.notes.extend(
+        damaged(&said).or_else(|| cut_short(path)).map(|doubt| format!("{}: {doubt}", path.display())),
+    );
+    if interpreter == Interpreter::Older {
+        art.notes.push(format!("{}: {OLDER}", path.display()));
+    }
+    Ok(art)
+}
+
+/// A document and how it is read.
+struct Document<'a> {
+    path: &'a Path,
+    interpreter: Interpreter,
+    folder: &'a Scratch,
+    options: &'a Options,
+}
+
+impl Document<'_> {
+    /// The only page that holds art; the first if none does.
+    fn only_page(&self, leaves: &[Leaf]) -> Result<Artwork, Diagnosis> {
+        let drawn: Vec<&Leaf> = leaves.iter().filter(|leaf| leaf.drawn).collect();
+        let leaf = match drawn[..] {
+            [] => &leaves[0],
+            [one] => one,
+            _ => {
+                let pages: Vec<u32> = drawn.iter().map(|leaf| leaf.number).collect();
+                return Err(several_pages(self.path, &pages));
+            }
+        };
+        let mut art = self.page(leaf)?;
+        if leaves.len() > 1 {
+            art.notes.push(format!(
+                "{}: page {} of {} is read; the others are blank",
+                self.path.display(),
+                leaf.number,
+                leaves.len()
+            ));
+        }
+        Ok(art)
+    }
+
+    /// One page: plates if spot colours name inks, else a picture.
+    fn page(&self, leaf: &Leaf) -> Result<Artwork, Diagnosis> {
+        let name = stem(self.path);
+        let mut notes = Vec::new();
+        let dpi = self.dpi(leaf, &mut notes)?;
+        if !plates::layers(self.path, &self.path.display(), &leaf.spots, &mut notes)?.is_empty() {
+            // The plates tell of the other spots themselves.
+            let mut art =
+                plates::separated_part((self.path, self.interpreter), leaf.number, Part::CropBox, dpi)?
+                    .whole(&name, self.options);
+            if art.layers.is_empty() && art.colour.is_none() {
+                return Err(nothing("no plate of the page has a dot"));
+            }
+            notes.retain(|note| !art.notes.contains(note));
+            art.notes.append(&mut notes);
+            return Ok(art);
+        }
+        let mut art = self.drawn(leaf, dpi)?;
+        art.notes.append(&mut notes);
+        Ok(art)
+    }
+
+    /// What a page draws, with the kind of each pixel.
+    fn drawn(&self, leaf: &Leaf, dpi: (f64, f64)) -> Result<Artwork, Diagnosis> {
+        let Tagged { size, pixels } =
+            draw::tagged((self.path, self.interpreter), leaf.number, Part::CropBox, dpi, self.folder)?;
+        let dots = (size.0 as usize, size.1 as usize);
+        Ok(picture::tagged_artwork(&stem(self.path), size, dots, pixels, self.options))
+    }
+
+    /// One layer for each page, by the rules for pictures that are named after inks.
+    fn pages_of_inks(
+        &self,
+        leaves: &[Leaf],
+        inks: &[Ink],
+        observer: &dyn Observer,
+    ) -> Result<Artwork, Diagnosis> {
+        let path = self.path;
+        let beyond = leaves.iter().skip(inks.len()).find(|leaf| leaf.drawn);
+        if let Some(leaf) = beyond {
+            let problem =
+                format!("page {} has art, but an ink is named for {} pages only", leaf.number, inks.len());
+            return Err(wrong(path, problem));
+        }
+        if leaves.len() < inks.len() {
+            let problem =
+                format!("it has {} pages, but {} inks are named for them", leaves.len(), inks.len());
+            return Err(wrong(path, problem));
+        }
+        let first = &leaves[0];
+        let mut notes = Vec::new();
+        let dpi = self.dpi(first, &mut notes)?;
+        let mut art: Option<Artwork> = None;
+        observer.begin("drawing pages", inks.len() as u64);
+        for (leaf, &ink) in leaves.iter().zip(inks) {
+            if (leaf.size.0 - first.size.0).abs() > 1.0 || (leaf.size.1 - first.size.1).abs() > 1.0 {
+                let mm = |(x, y): (f64, f64)| format!("{:.0} x {:.0} mm", x * 25.4 / DRAFT, y * 25.4 / DRAFT);
+                let problem = format!(
+                    "page {} is {}, but page {} is {}",
+                    leaf.number,
+                    mm(leaf.size),
+                    first.number,
+                    mm(first.size)
+                );
+                return Err(wrong(path, problem).hint("the pages of one print have one size"));
+            }
+            let name = format!("page {}", leaf.number);
+            let scan = self.layer(leaf, dpi)?;
+            let dots = (scan.width as usize, scan.height as usize);
+            let named = names::of_page(inks, leaf.number, ink);
+            let art = art.get_or_insert_with(|| Artwork::blank(&stem(path), dots));
+            art.add(scan, &name, named, false, self.options);
+            if leaf.drawn && art.layers.last().is_none_or(Layer::is_blank) {
+                return Err(no_dot(path, &name, ink));
+            }
+            observer.advance(1);
+        }
+        observer.end();
+        let mut art = art.ok_or_else(|| nothing("no ink is named"))?;
+        art.opaque = Some(art.drawn.clone());
+        art.notes.append(&mut notes);
+        Ok(art)
+    }
+
+    /// A page as coverage.
+    fn layer(&self, leaf: &Leaf, dpi: (f64, f64)) -> Result<Scan, Diagnosis> {
+        let drawn = draw::picture((self.path, self.interpreter), leaf.number, dpi, self.folder)?;
+        let mut picture = file::picture(&drawn, None)?;
+        picture.to_srgb()?;
+        let rgba = picture.colours.map_or_else(Vec::new, Raster::into_rgba);
+        Ok(Scan::of_page(self.path, picture.size, &rgba))
+    }
+
+    /// The resolution at which a page has its final number of dots: that of the printer, as in a print queue, unless a size is set.
+    /// The program that draws rounds the sides of a page as the printer needs it.
+    fn dpi(&self, leaf: &Leaf, notes: &mut Vec<String>) -> Result<(f64, f64), Diagnosis> {
+        let unstated = Unstated::Drawing { rounded_mm: leaf.rounded_mm };
+        let dots = size::dots(self.path, leaf.size, Some((DRAFT, DRAFT)), unstated, self.options, notes)?;
+        if self.options.size.is_none() {
+            return Ok((size::DPI * self.options.across.max(1) as f64, size::DPI));
+        }
+        Ok((DRAFT * dots.0 as f64 / leaf.size.0, DRAFT * dots.1 as f64 / leaf.size.1))
+    }
+}

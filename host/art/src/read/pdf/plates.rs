@@ -1,0 +1,428 @@
+//! The plates of a page: spot colours that name inks, and the process plates.
+//!
+//! Problem: a spot colour may name an ink, or none; and one colour may be made of several spots (DeviceN), of which some
+//! name inks.
+//! Method: Ghostscript makes a plate of every spot. A spot that names a special ink is a layer of it. Every other spot is
+//! printed by its process colours: its plate is added to the process plates, in the shares that Ghostscript gives for its
+//! full tint. So a colour of several spots keeps each part. A name that resembles that of an ink is an error, because a
+//! slip would cost ribbon. The layers of art and the print queues use the same two functions, [`survey`] and [`separated`].
+//! If a process plate has tones, the page is drawn once more with the kind of each pixel, and what lies beside the layers is
+//! treated like any page: what drew a pixel decides how its colour is mixed. On dots of layers the process plates say what
+//! overprints. What is for a cutter is left out; marks that every plate has are printed on the plates that have more than these. Colours
+//! that are drawn over white knock it out unless the document says otherwise, which is the default of layout programs: a third run, in
+//! which all overprints, tells how many dots that are.
+//! Cost: seconds a page, twice if it has tones, once more if it has white and colours. Limits: where a spot overprints, tints between none
+//! and full are taken as
+//! proportional.
+
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+
+use protocol::ink::{Ink, Kind};
+use rayon::prelude::*;
+
+use super::conversion;
+use super::draw::{PROCESS, Part, Tagged, drafts, plates_beside, separate, tagged};
+use super::ghostscript::Interpreter;
+use crate::artwork::Artwork;
+use crate::error::{NamedPart, io, unknown_ink, wrong};
+use crate::options::Options;
+use crate::read::coverage::{Coverage, Scan};
+use crate::read::cut_lines;
+use crate::read::file;
+use crate::read::names::{self, Named};
+use crate::read::object_type;
+use crate::read::picture;
+use crate::read::size;
+use crate::window::Window;
+use files::scratch::Scratch;
+use observe::{Diagnosis, Observer};
+
+/// Full ink in what Ghostscript says of a spot.
+const FULL: f64 = 32760.0;
+
+/// What becomes of a spot.
+enum Spot {
+    /// It is a layer of an ink.
+    Layer(Named),
+    /// It is printed by its process colours.
+    Process,
+    /// It is for a cutter and not printed.
+    Cut,
+}
+
+/// What becomes of a spot. One that names a process ink is printed by its process colours, like one that names no ink; of the latter
+/// there is a note, which begins with `place`.
+///
+/// # Errors
+/// A name that resembles that of an ink.
+fn spot(path: &Path, place: &dyn Display, spot: &str, notes: &mut Vec<String>) -> Result<Spot, Diagnosis> {
+    if cut_lines::is_cut(spot) {
+        notes.push(cut_lines::note(place, "spot colour", spot));
+        return Ok(Spot::Cut);
+    }
+    match names::ink(spot) {
+        Some(named) if named.ink.kind() != Kind::Process => Ok(Spot::Layer(named)),
+        Some(_) => Ok(Spot::Process),
+        None => match names::closest(spot) {
+            suggestion @ Some(_) => Err(unknown_ink(path, NamedPart::Spot, spot, suggestion)),
+            None => {
+                notes.push(format!(
+                    "{place}: spot colour `{spot}` names no ink: printed by its process colours"
+                ));
+                Ok(Spot::Process)
+            }
+        },
+    }
+}
+
+/// Of these spots, those that have plates of their own: layers of ink, and what is for a cutter.
+pub(super) fn layers(
+    path: &Path,
+    place: &dyn Display,
+    spots: &[String],
+    notes: &mut Vec<String>,
+) -> Result<Vec<String>, Diagnosis> {
+    let mut found = Vec::new();
+    for name in spots {
+        if !matches!(spot(path, place, name, notes)?, Spot::Process) {
+            found.push(name.clone());
+        }
+    }
+    Ok(found)
+}
+
+/// What drafts tell of a whole document.
+pub struct Survey {
+    /// For each page the spot colours that are layers of ink and not blank. Empty for a document without pages.
+    pub spots: Vec<Vec<String>>,
+    /// The interpreter that draws most of it.
+    pub interpreter: Interpreter,
+}
+
+/// Looks at all pages of a document. Notes name the page of a spot colour that names no ink.
+///
+/// # Errors
+/// A document that Ghostscript cannot read, no Ghostscript, or a name that resembles that of an ink.
+pub fn survey(path: &Path, observer: &dyn Observer) -> Result<Survey, Diagnosis> {
+    let folder = Scratch::new().map_err(io(path, "make a folder for its plates"))?;
+    let (drafts, interpreter) = drafts(path, None, Part::Sheet, &folder)?;
+    let mut notes = Vec::new();
+    let spots = drafts
+        .leaves
+        .iter()
+        .map(|leaf| layers(path, &format_args!("page {}", leaf.number), &leaf.spots, &mut notes))
+        .collect::<Result<_, _>>()?;
+    notes.iter().for_each(|note| observer.note(note));
+    Ok(Survey { spots, interpreter })
+}
+
+/// A page as plates: one for each spot colour that is a layer of ink, and the process plates for the rest.
+pub struct Separated {
+    /// Pixels across and down.
+    pub size: (usize, usize),
+    dpi: f64,
+    plates: Vec<(String, Named, Vec<u8>)>,
+    /// What is printed beside the plates, with the kind of each pixel.
+    rest: Option<Vec<u8>>,
+    /// The plates for a cutter.
+    cuts: Vec<Vec<u8>>,
+    /// The plate of white as it is if the colours do not knock it out, if they do.
+    knocked_out: Option<Vec<u8>>,
+    notes: Vec<String>,
+}
+
+/// Separates a page at `dpi` pixels per inch into plates for the spot colours of [`survey`] and the process plates.
+///
+/// # Errors
+/// As [`open`](crate::open()).
+pub fn separated(
+    path: &Path,
+    interpreter: Interpreter,
+    page: usize,
+    dpi: f64,
+) -> Result<Separated, Diagnosis> {
+    let page = u32::try_from(page).map_err(|_| wrong(path, format!("there is no page {page}")))?;
+    separated_part((path, interpreter), page, Part::Sheet, (dpi, dpi))
+}
+
+pub(super) fn separated_part(
+    (path, interpreter): (&Path, Interpreter),
+    page: u32,
+    part: Part,
+    dpi: (f64, f64),
+) -> Result<Separated, Diagnosis> {
+    let folder = Scratch::new().map_err(io(path, "make a folder for its plates"))?;
+    let full = folder.path().join("page.tif");
+    let said = separate((path, interpreter), page, part, dpi, &full, false)?;
+    let (width, height) = file::size(&full).ok_or_else(|| wrong(path, format!("there is no page {page}")))?;
+    let (mut plates, mut notes) = (Vec::new(), Vec::new());
+    let (mut process, mut others, mut cuts) = (Vec::new(), Vec::new(), Vec::new());
+    for (plate, plate_file) in plates_beside(&full, &folder)? {
+        let scan = Scan::of_picture(file::picture(&plate_file, None)?);
+        if (scan.width, scan.height) != (width, height) {
+            return Err(wrong(path, format!("plate {plate} of page {page} differs in size from the page")));
+        }
+        if PROCESS.contains(&plate.as_str()) {
+            process.push((plate, scan.coverage));
+        } else if scan.coverage.iter().any(|&c| c > 0) {
+            match spot(path, &path.display(), &plate, &mut notes)? {
+                Spot::Layer(named) => plates.push((plate, named, scan.coverage)),
+                Spot::Process => others.push((plate, scan.coverage)),
+                Spot::Cut => cuts.push(scan.coverage),
+            }
+        }
+    }
+    let mut all: Vec<&mut Vec<u8>> = Vec::new();
+    all.extend(process.iter_mut().map(|(_, coverage)| coverage));
+    all.extend(plates.iter_mut().map(|(_, _, coverage)| coverage));
+    all.extend(others.iter_mut().map(|(_, coverage)| coverage));
+    all.extend(&mut cuts);
+    if unregistered(&mut all) {
+        plates.retain(|(.., coverage)| coverage.iter().any(|&c| c > 0));
+        let place = path.display();
+        notes.push(format!(
+            "{place}: marks in the registration colour are printed in the inks that the page has anyway"
+        ));
+    }
+    let knocked_out = match plates.iter().find(|(_, named, _)| named.ink == Ink::White) {
+        Some((plate, _, white)) if process.iter().any(|(_, c)| c.iter().any(|&c| c > 0)) => {
+            let again = Scratch::new().map_err(io(path, "make a folder for its plates"))?;
+            let full = again.path().join("page.tif");
+            separate((path, interpreter), page, part, dpi, &full, true)?;
+            kept(plate, white, &process, &plates_beside(&full, &again)?)?
+        }
+        _ => None,
+    };
+    for (spot, coverage) in others {
+        match full_tint(&said, &spot) {
+            Some(tint) => add(&mut process, &coverage, tint),
+            None => notes.push(format!(
+                "{}: the process colours of spot colour `{spot}` are not known: left out",
+                path.display()
+            )),
+        }
+    }
+    let toned = |coverage: &[u8]| coverage.par_iter().any(|&c| c != 0 && c != 255);
+    let mut rest = None;
+    if process.iter().any(|(_, coverage)| toned(coverage)) {
+        let Tagged { size, mut pixels } = tagged((path, interpreter), page, part, dpi, &folder)?;
+        if size != (width, height) {
+            return Err(wrong(path, format!("page {page} differs in size from its plates")));
+        }
+        let own = plates.iter().map(|(.., coverage)| coverage).chain(&cuts);
+        overprint(&mut pixels, &own.collect::<Vec<_>>(), &process);
+        rest = Some(pixels);
+    } else {
+        for (plate, coverage) in process {
+            if let Some(named) = names::ink(&plate) {
+                plates.push((plate, named, coverage));
+            }
+        }
+    }
+    let size = (width as usize, height as usize);
+    Ok(Separated { size, dpi: dpi.0, plates, rest, cuts, knocked_out, notes })
+}
+
+/// Takes marks in the registration colour, which every plate has alike, off all plates that have nothing else. Whether there were any
+/// on such a plate. A page of nothing but marks keeps them.
+fn unregistered(plates: &mut [&mut Vec<u8>]) -> bool {
+    let Some(((first, others), count)) = plates.split_first().zip(plates.first().map(|plate| plate.len()))
+    else {
+        return false;
+    };
+    if others.is_empty() {
+        return false;
+    }
+    let marks: Vec<bool> = (0..count)
+        .into_par_iter()
+        .map(|at| first[at] > 0 && others.iter().all(|other| other[at] == first[at]))
+        .collect();
+    let only = |plate: &Vec<u8>| plate.par_iter().zip(&marks).all(|(&c, &mark)| c == 0 || mark);
+    let bare: Vec<bool> = plates.iter().map(|plate| only(plate)).collect();
+    if !marks.contains(&true) || bare.iter().all(|&bare| bare) {
+        return false;
+    }
+    for (plate, _) in plates.iter_mut().zip(&bare).filter(|(_, bare)| **bare) {
+        plate.fill(0);
+    }
+    bare.contains(&true)
+}
+
+/// The white that lies beneath the colours if they do not knock it out; `None` if it is the same.
+fn kept(
+    plate: &str,
+    white: &[u8],
+    process: &[(String, Vec<u8>)],
+    again: &[(String, PathBuf)],
+) -> Result<Option<Vec<u8>>, Diagnosis> {
+    let Some((_, again)) = again.iter().find(|(name, _)| name == plate) else { return Ok(None) };
+    let mut whole = Scan::of_picture(file::picture(again, None)?).coverage;
+    if whole.len() != white.len() {
+        return Ok(None);
+    }
+    let mut knocked = false;
+    for (at, (whole, &white)) in whole.iter_mut().zip(white).enumerate() {
+        let colour = process.iter().any(|(_, coverage)| coverage[at] > 0);
+        if *whole > white && colour {
+            knocked = true;
+        } else {
+            *whole = white;
+        }
+    }
+    Ok(knocked.then_some(whole))
+}
+
+/// Replaces what was drawn on the dots of layers, where it shows the layer, with what the process plates have there.
+fn overprint(pixels: &mut [u8], layers: &[&Vec<u8>], process: &[(String, Vec<u8>)]) {
+    const ROWS: usize = 1 << 16;
+    let of = |name: &str| process.iter().find(|(plate, _)| plate == name).map(|(_, coverage)| &coverage[..]);
+    let inks = PROCESS.map(of);
+    // As what is drawn beside the layers is converted.
+    let taken: [u8; 256] =
+        std::array::from_fn(|ink| (255.0 * conversion::taken(ink as f64 / 255.0)).round() as u8);
+    let taken = |ink: u8| taken[usize::from(ink)];
+    pixels.par_chunks_mut(object_type::BYTES * ROWS).enumerate().for_each(|(block, pixels)| {
+        for (at, pixel) in (block * ROWS..).zip(pixels.as_chunks_mut::<{ object_type::BYTES }>().0) {
+            if layers.iter().any(|coverage| coverage[at] > 0) {
+                let [c, m, y, k] = inks.map(|ink| ink.map_or(0, |coverage| coverage[at]));
+                let [_, rgb @ ..] = pixel;
+                *rgb = [c, m, y].map(|ink| 255 - taken(ink).saturating_add(taken(k)));
+            }
+        }
+    });
+}
+
+/// The process colours of a spot's full tint, as shares from 0 to 1 in the order of [`PROCESS`], from what Ghostscript says:
+/// `%%SeparationColor: "NAME" 100% ink = C M Y K CMYK`.
+fn full_tint(said: &str, spot: &str) -> Option<[f64; 4]> {
+    said.lines().find_map(|line| {
+        let (name, rest) = line.strip_prefix("%%SeparationColor: \"")?.split_once("\" 100% ink = ")?;
+        if name != spot {
+            return None;
+        }
+        let shares: Vec<f64> = rest.split_whitespace().map_while(|word| word.parse().ok()).collect();
+        let shares: [f64; 4] = shares.try_into().ok()?;
+        Some(shares.map(|share| (share / FULL).clamp(0.0, 1.0)))
+    })
+}
+
+/// Adds a spot's plate to the process plates.
+fn add(process: &mut [(String, Vec<u8>)], coverage: &[u8], tint: [f64; 4]) {
+    for (plate, dots) in process {
+        let Some(at) = PROCESS.iter().position(|name| name == plate) else { continue };
+        let share = (tint[at] * 256.0).round() as u32;
+        if share == 0 {
+            continue;
+        }
+        for (dot, &spot) in dots.iter_mut().zip(coverage).filter(|(_, spot)| **spot > 0) {
+            *dot = (u32::from(*dot) + (u32::from(spot) * share + 128) / 256).min(255) as u8;
+        }
+    }
+}
+
+impl Separated {
+    /// The smallest rectangle around everything drawn, in pixels; `None` for a blank page.
+    pub fn bounds(&self) -> Option<Window> {
+        let plates = self.plates.iter();
+        plates
+            .filter_map(|(.., coverage)| Window::around(coverage, self.size.0, 1, 0))
+            .chain(self.rest.iter().filter_map(|pixels| object_type::bounds(pixels, self.size.0)))
+            .reduce(|all, window| all.join(&window))
+    }
+
+    /// The page as art, a layer for each plate.
+    ///
+    /// # Errors
+    /// A page of no dots, or of more than 65535 on a side.
+    pub fn art(self, name: &str, options: &Options) -> Result<Artwork, Diagnosis> {
+        let empty = || wrong(Path::new(name), "the page has no dots");
+        let dots = size::page_dots(self.size, self.dpi).ok_or_else(empty)?;
+        Ok(self.art_of(name, dots, options))
+    }
+
+    /// The same with a dot for each pixel.
+    pub(super) fn whole(self, name: &str, options: &Options) -> Artwork {
+        let dots = self.size;
+        self.art_of(name, dots, options)
+    }
+
+    fn art_of(self, name: &str, dots: (usize, usize), options: &Options) -> Artwork {
+        // The plates were read from TIFF files, whose sides fit in u32.
+        let size = (self.size.0 as u32, self.size.1 as u32);
+        let mut art = match self.rest {
+            None => Artwork::blank(name, dots),
+            Some(pixels) => {
+                picture::opaque_artwork::<{ object_type::BYTES }>(name, name, size, dots, pixels, options)
+            }
+        };
+        if let Some(colour) = &mut art.colour {
+            colour.overprints = true;
+        }
+        for (plate, named, mut coverage) in self.plates {
+            if let (Ink::White, Some(whole)) = (named.ink, &self.knocked_out) {
+                let dots = whole.iter().zip(&coverage).filter(|(whole, own)| whole > own).count() as u64;
+                if options.keep_white {
+                    coverage.clone_from(whole);
+                } else {
+                    art.knocked_out = dots;
+                }
+            }
+            let scan = Scan {
+                path: name.into(),
+                width: size.0,
+                height: size.1,
+                dpi: None,
+                coverage,
+                by: Coverage::Dark,
+            };
+            art.add(scan, &plate, named, true, options);
+        }
+        if options.cut_lines {
+            self.cuts.iter().for_each(|cut| art.add_cut(cut));
+        }
+        art.notes.extend(self.notes);
+        art
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_of_all_plates_are_taken_off_those_that_have_nothing_else() {
+        let of = |plates: [[u8; 4]; 3]| {
+            let mut plates = plates.map(Vec::from);
+            let mut all: Vec<&mut Vec<u8>> = plates.iter_mut().collect();
+            (unregistered(&mut all), plates.map(|plate| [plate[0], plate[1], plate[2], plate[3]]))
+        };
+        let black = [255, 0, 90, 0];
+        assert_eq!(of([[255, 0, 0, 0], black, [255, 0, 0, 0]]), (true, [[0; 4], black, [0; 4]]));
+        // Marks on plates that all have art, no marks, and nothing but marks.
+        for plates in
+            [[[255, 1, 0, 0], black, [255, 0, 0, 7]], [[0, 1, 0, 0], [0; 4], [0; 4]], [[255, 0, 0, 0]; 3]]
+        {
+            assert_eq!(of(plates), (false, plates));
+        }
+    }
+
+    #[test]
+    fn what_ghostscript_says_of_a_spot_becomes_shares() {
+        let said = "noise\n%%SeparationColor: \"Die \"line\"\" 100% ink = 0 32760 16380 0 CMYK\n";
+        assert_eq!(full_tint(said, "Die \"line\""), Some([0.0, 1.0, 0.5, 0.0]));
+        assert_eq!(full_tint(said, "Die"), None);
+        assert_eq!(full_tint("%%SeparationColor: \"a\" 100% ink = 0 x", "a"), None);
+    }
+
+    #[test]
+    fn a_spots_plate_is_added_in_its_shares_and_no_plate_overflows() {
+        let mut process: Vec<(String, Vec<u8>)> =
+            PROCESS.iter().map(|name| ((*name).to_owned(), vec![0, 100, 200])).collect();
+        add(&mut process, &[255, 100, 255], [0.0, 1.0, 0.5, 0.0]);
+        let of = |name: &str| process.iter().find(|(plate, _)| plate == name).unwrap().1.clone();
+        assert_eq!(of("Cyan"), [0, 100, 200]);
+        assert_eq!(of("Magenta"), [255, 200, 255]);
+        assert_eq!(of("Yellow"), [128, 150, 255]);
+    }
+}
