@@ -21,9 +21,10 @@ mod thin;
 mod turned;
 
 use super::*;
+use crate::colour::packed;
 use crate::dots::bitplane;
-use crate::read::pdf::Interpreter;
 use crate::read::file;
+use crate::read::pdf::Interpreter;
 use observe::Silent;
 use protocol::ink::Ink;
 use tempfile::TempDir;

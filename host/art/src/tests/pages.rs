@@ -181,7 +181,7 @@ fn spots_without_an_ink_print_by_their_process_colours_in_layers_and_queue_alike
     for ((x, y), wanted) in
         [((500, 474), [255, 0, 188]), ((350, 250), [255, 188, 225]), ((700, 250), [255; 3])]
     {
-        let found = key::colour(keys[y * art.width + x]);
+        let found = packed::colour(keys[y * art.width + x]);
         assert!(found.iter().zip(wanted).all(|(v, w)| v.abs_diff(w) <= 3), "at {x}, {y}: {found:?}");
     }
     let note = "spot colour `Violet` names no ink: printed by its process colours";

@@ -236,7 +236,7 @@ fn with_profile(profile: &moxcms::ColorProfile, kind: png::ColorType, pixel: &[u
     encoder.write_header().unwrap().write_image_data(&pixel.repeat(4)).unwrap();
     let art = read(&[file], &Options::default());
     assert!(art.notes.iter().any(|note| note.contains("profile was applied")), "{:?}", art.notes);
-    key::colour(art.colour.unwrap().keys((art.width, art.length))[0])
+    packed::colour(art.colour.unwrap().keys((art.width, art.length))[0])
 }
 
 #[test]
