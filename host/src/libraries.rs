@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use files::durable;
 use files::scratch::{self, Scratch};
+use files::shelf::Disk;
 use inks::archive::{self, Member};
 use inks::{FILE_NAME, Library};
 
@@ -70,7 +71,7 @@ pub fn open(spec: &Path) -> Result<Library> {
         return Ok(Library::builtin());
     }
     let folder = folder(spec)?;
-    Library::from_dir(&folder).with_context(|| format!("{} is not a usable ink library", folder.display()))
+    Library::open(&Disk, &folder).with_context(|| format!("{} is not a usable ink library", folder.display()))
 }
 
 /// The library asked for; without one, that of the program.
@@ -97,7 +98,7 @@ pub fn install(name: &str, members: &[Member]) -> Result<(PathBuf, Library)> {
     let inside = staging.path().join(name);
     fs::create_dir(&inside).with_context(cannot)?;
     archive::place(members, &inside).with_context(cannot)?;
-    let library = Library::from_dir(&inside).map_err(|error| {
+    let library = Library::open(&Disk, &inside).map_err(|error| {
         // The staging folder means nothing to the user.
         let said =
             error.to_string().replace(&format!("{}{}", inside.display(), std::path::MAIN_SEPARATOR), "");

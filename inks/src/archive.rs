@@ -14,6 +14,9 @@ use std::fmt::Write as _;
 use std::io::{Cursor, Read as _, Write as _};
 use std::path::{Component, Path};
 
+use files::FileError;
+use files::durable::{self, Access};
+use files::shelf::{Disk, Shelf};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 use zip::write::SimpleFileOptions;
@@ -60,6 +63,9 @@ pub enum ArchiveError {
         /// The error of the system.
         source: std::io::Error,
     },
+    /// A file cannot be written.
+    #[error(transparent)]
+    Write(#[from] FileError),
     /// A file does not belong into an archive, or cannot be trusted.
     #[error("{name}: {problem}")]
     Member {
@@ -116,33 +122,30 @@ struct Listed {
 ///
 /// # Errors
 /// Files that are missing, too large, or have names that not every system can store.
-pub fn gather(folder: &Path) -> Result<Vec<Member>, ArchiveError> {
-    let library = bytes_of(folder, FILE_NAME)?;
+pub fn gather(shelf: &dyn Shelf, folder: &Path) -> Result<Vec<Member>, ArchiveError> {
+    let library = bytes_of(shelf, folder, FILE_NAME)?;
     let text = std::str::from_utf8(&library).map_err(|error| member(FILE_NAME, error.to_string()))?;
     let parsed: File = toml::from_str(text).map_err(|error| member(FILE_NAME, error.message()))?;
     let mut names: BTreeSet<String> = BTreeSet::new();
     for table in parsed.measured.iter().chain(&parsed.predicted) {
         names.insert(plain(table.get_ref().curve.get_ref())?);
     }
-    names.extend(BESIDE.iter().filter(|name| folder.join(name).is_file()).map(|&name| name.to_owned()));
+    names.extend(BESIDE.iter().filter(|name| shelf.is_file(&folder.join(name))).map(|&name| name.to_owned()));
     let mut members = vec![Member { name: FILE_NAME.into(), bytes: library }];
     for name in names {
-        let bytes = bytes_of(folder, &name)?;
+        let bytes = bytes_of(shelf, folder, &name)?;
         members.push(Member { name, bytes });
     }
     limits(&members)?;
     Ok(members)
 }
 
-fn bytes_of(folder: &Path, name: &str) -> Result<Vec<u8>, ArchiveError> {
-    let io = |source| ArchiveError::Io { name: name.into(), source };
-    let mut bytes = Vec::new();
+fn bytes_of(shelf: &dyn Shelf, folder: &Path, name: &str) -> Result<Vec<u8>, ArchiveError> {
     let most = most_bytes(name);
-    std::fs::File::open(folder.join(name)).map_err(io)?.take(most + 1).read_to_end(&mut bytes).map_err(io)?;
-    if bytes.len() as u64 > most {
-        return Err(member(name, format!("is longer than {most} bytes")));
-    }
-    Ok(bytes)
+    shelf.read(&folder.join(name), most).map_err(|error| match error {
+        FileError::Io { source, .. } => ArchiveError::Io { name: name.into(), source },
+        _ => member(name, format!("is longer than {most} bytes")),
+    })
 }
 
 fn most_bytes(name: &str) -> u64 {
@@ -348,13 +351,18 @@ fn verify(members: &[Member]) -> Result<(), ArchiveError> {
 /// Files that cannot be written.
 pub fn place(members: &[Member], folder: &Path) -> Result<(), ArchiveError> {
     for member in members {
-        let io = |source| ArchiveError::Io { name: member.name.clone(), source };
         let path = folder.join(plain(&member.name)?);
         if let Some(parent) = path.parent() {
-            std::fs::create_dir_all(parent).map_err(io)?;
+            let io = |source| ArchiveError::Io { name: member.name.clone(), source };
+            durable::make_folder(parent, Access::Everyone).map_err(io)?;
         }
-        let mut file = std::fs::File::create_new(path).map_err(io)?;
-        file.write_all(&member.bytes).map_err(io)?;
+        if Disk.kind(&path).is_ok() {
+            return Err(ArchiveError::Io {
+                name: member.name.clone(),
+                source: std::io::ErrorKind::AlreadyExists.into(),
+            });
+        }
+        files::write(&path, |out| out.write_all(&member.bytes))?;
     }
     Ok(())
 }

@@ -24,14 +24,6 @@ pub struct Curve {
 /// Why some numbers are not a curve.
 #[derive(Debug, thiserror::Error)]
 pub enum CurveError {
-    /// Reading or writing failed.
-    #[error("{}: cannot be read or written", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The error of the system.
-        source: std::io::Error,
-    },
     /// The file is not CSV with the expected columns.
     #[error(
         "{}: line {line}: {problem}; expected the header `theta_h_deg,r,g,b` and four numbers per line",
@@ -111,13 +103,6 @@ impl Curve {
     pub fn at(&self, theta: f64) -> [f64; 3] {
         let place = self.knots.place(theta);
         std::array::from_fn(|c| self.knots.value(place, |i| self.rgb[i][c]))
-    }
-
-    /// Reads the CSV form.
-    pub fn read_csv(path: &Path) -> Result<Curve, CurveError> {
-        let file = std::fs::File::open(path)
-            .map_err(|source| CurveError::Io { path: path.to_path_buf(), source })?;
-        Curve::from_csv(std::io::BufReader::new(file), path)
     }
 
     /// Reads the CSV form from any input; `path` is used only in errors.

@@ -3,9 +3,11 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
+use files::shelf::Shelf;
+
 use crate::library::Library;
 use crate::problem::Problem;
-use crate::read;
+use crate::read::{self, Folder};
 use crate::rule::Severity;
 
 /// Why a folder is not a valid library.
@@ -44,16 +46,16 @@ impl Library {
     }
 
     /// Reads the library in a folder: `library.toml` and its curves.
-    pub fn from_dir(folder: &Path) -> Result<Library, LibraryError> {
-        match read::folder(folder, Library::builtin) {
+    pub fn open(shelf: &dyn Shelf, folder: &Path) -> Result<Library, LibraryError> {
+        match read::folder(Folder { shelf, path: folder }, Library::builtin) {
             (Some(library), _) => Ok(library),
             (None, problems) => Err(LibraryError::Problems { problems }),
         }
     }
 
     /// All findings about the library in a folder, the most severe first.
-    pub fn check(folder: &Path) -> Vec<Problem> {
-        let (_, mut problems) = read::folder(folder, Library::builtin);
+    pub fn check(shelf: &dyn Shelf, folder: &Path) -> Vec<Problem> {
+        let (_, mut problems) = read::folder(Folder { shelf, path: folder }, Library::builtin);
         problems.sort_by_key(|problem| std::cmp::Reverse(problem.severity));
         problems
     }

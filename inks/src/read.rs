@@ -10,6 +10,7 @@ use maths::Maths;
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
+use files::shelf::Shelf;
 use protocol::ink::Ink;
 use toml::Spanned;
 
@@ -33,13 +34,20 @@ const CALIBRATION: f64 = 1.05;
 const MOST_GAIN: f64 = 85.0;
 
 type Found = (Option<Library>, Vec<Problem>);
-/// A library's folder, and what reads the built-in library it may be based on.
-type Folder<'a> = (&'a Path, fn() -> Library);
 
-/// Reads `folder/library.toml`, which may be based on the built-in library.
-pub(crate) fn folder(folder: &Path, built_in: fn() -> Library) -> Found {
-    let file = folder.join(FILE_NAME);
-    match text(&file, MOST_BYTES) {
+/// A library's folder.
+#[derive(Clone, Copy)]
+pub(crate) struct Folder<'a> {
+    /// Where it stands.
+    pub shelf: &'a dyn Shelf,
+    /// Its path there.
+    pub path: &'a Path,
+}
+
+/// Reads `library.toml` of a folder, which may be based on the library that `built_in` gives.
+pub(crate) fn folder(folder: Folder<'_>, built_in: fn() -> Library) -> Found {
+    let file = folder.path.join(FILE_NAME);
+    match text(folder.shelf, &file, MOST_BYTES) {
         Ok(text) => parse(&text, &file, Some((folder, built_in))),
         Err(problem) => {
             let problem =
@@ -51,7 +59,7 @@ pub(crate) fn folder(folder: &Path, built_in: fn() -> Library) -> Found {
 
 /// Reads the text of a library. The library of a folder can have curves and be based on the built-in one; the built-in
 /// text itself has no folder.
-pub(crate) fn parse(text: &str, file: &Path, folder: Option<Folder<'_>>) -> Found {
+pub(crate) fn parse(text: &str, file: &Path, folder: Option<(Folder<'_>, fn() -> Library)>) -> Found {
     let mut findings = Findings { text, file: file.to_path_buf(), found: Vec::new() };
     let parsed = match toml::from_str::<File>(text) {
         Ok(parsed) => parsed,
@@ -117,7 +125,7 @@ fn missing(findings: &mut Findings, table: &str) {
 fn build(
     file: File,
     base: Option<Library>,
-    folder: Option<&Path>,
+    folder: Option<Folder<'_>>,
     findings: &mut Findings,
 ) -> Option<Library> {
     let mut parts = base.map_or_else(Parts::default, Parts::from_base);
@@ -178,7 +186,7 @@ pub(crate) fn is_licence(text: &str) -> bool {
 fn measurements(
     measured: &[Spanned<MeasuredTable>],
     predicted: &[Spanned<MeasuredTable>],
-    folder: Option<&Path>,
+    folder: Option<Folder<'_>>,
     wanted: &mut Vec<Listing>,
     findings: &mut Findings,
 ) {

@@ -1,6 +1,6 @@
 //! Small files that appear whole or not at all, and settings and descriptions in TOML.
 //!
-//! A file is written beside its final place and renamed, so nobody ever reads half of one. A text is read up to 1 MB, so
+//! A file is written beside its final place and renamed, so nobody ever reads half of one. A text is read up to 4 MB, so
 //! a file that is not one of ours cannot fill the memory. [`durable`] is for what has to outlive a crash, [`shelf`] is what readers
 //! of documents see of a disk.
 #![deny(unsafe_code)]
@@ -9,11 +9,13 @@ pub mod durable;
 pub mod scratch;
 pub mod shelf;
 
-use std::io::{BufWriter, Read as _, Write};
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// The most bytes of a text.
-const MOST_TEXT: u64 = 1 << 20;
+use shelf::{Disk, Kind, Shelf};
+
+/// The most bytes of a text: a mix of 128 inks' stacks has some 2 MB.
+const MOST_TEXT: u64 = 4 << 20;
 
 /// Why a file cannot be written or read.
 #[derive(Debug, thiserror::Error)]
@@ -27,6 +29,18 @@ pub enum FileError {
         attempt: &'static str,
         /// What the system said.
         source: std::io::Error,
+    },
+    /// A folder of ours was expected, and this is none.
+    #[error("{} is no {name}: {why}; `foilpress {command}` makes one", folder.display())]
+    Missing {
+        /// The folder.
+        folder: PathBuf,
+        /// What it should have been.
+        name: &'static str,
+        /// Why it is none.
+        why: String,
+        /// The command that makes one.
+        command: &'static str,
     },
     /// The file is longer than anything of its kind.
     #[error("{}: size in bytes is {found}; the limit is {most}", path.display())]
@@ -93,6 +107,11 @@ pub fn write(
     Ok(())
 }
 
+/// Makes a folder that does not exist yet.
+pub fn new_folder(path: &Path) -> Result<(), FileError> {
+    std::fs::create_dir(path).map_err(io(path, "write"))
+}
+
 /// Writes a value as TOML.
 pub fn write_toml(path: &Path, value: &impl serde::Serialize) -> Result<(), FileError> {
     let text = toml::to_string(value)
@@ -100,14 +119,46 @@ pub fn write_toml(path: &Path, value: &impl serde::Serialize) -> Result<(), File
     write(path, |out| out.write_all(text.as_bytes()))
 }
 
-/// Reads TOML of at most a megabyte; unknown fields are the type's own business.
+/// Reads TOML of at most 4 MB; unknown fields are the type's own business.
 pub fn read_toml<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, FileError> {
     let wrong = |problem: String| FileError::Text { path: path.to_path_buf(), problem };
-    let file = std::fs::File::open(path).map_err(io(path, "open"))?;
-    let mut text = String::new();
-    file.take(MOST_TEXT + 1).read_to_string(&mut text).map_err(io(path, "read"))?;
-    if text.len() as u64 > MOST_TEXT {
-        return Err(wrong(format!("more than {MOST_TEXT} bytes")));
-    }
+    let text = String::from_utf8(Disk.read(path, MOST_TEXT)?)
+        .map_err(|error| wrong(format!("not UTF-8 text (byte {})", error.utf8_error().valid_up_to())))?;
     toml::from_str(&text).map_err(|error| wrong(error.to_string().trim_end().to_string()))
+}
+
+/// A kind of folder that this program writes.
+pub struct FolderKind {
+    /// What it is called.
+    pub name: &'static str,
+    /// The text in it that describes the rest.
+    pub text: &'static str,
+    /// The command that makes it.
+    pub command: &'static str,
+}
+
+impl FolderKind {
+    /// Reads the text of such a folder.
+    pub fn read<T: serde::de::DeserializeOwned>(&self, folder: &Path) -> Result<T, FileError> {
+        read_toml(&folder.join(self.text)).map_err(|error| self.unless_missing(&Disk, folder, error))
+    }
+
+    /// The error of a text that cannot be read, or, if there is none, what the folder should have been.
+    pub fn unless_missing(&self, shelf: &dyn Shelf, folder: &Path, error: FileError) -> FileError {
+        use std::io::ErrorKind;
+        match &error {
+            FileError::Io { source, .. }
+                if matches!(source.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) =>
+            {
+                let why = match shelf.kind(folder) {
+                    Ok(Kind::Folder) => format!("it has no {}", self.text),
+                    Ok(_) => "it is a file".into(),
+                    Err(_) => "there is no such folder".into(),
+                };
+                let FolderKind { name, command, .. } = *self;
+                FileError::Missing { folder: folder.to_path_buf(), name, why, command }
+            }
+            _ => error,
+        }
+    }
 }

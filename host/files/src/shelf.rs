@@ -94,11 +94,12 @@ pub trait Shelf: Debug + Send + Sync {
     }
 }
 
-trait Input: Read + Seek + Send {}
+trait Input: Debug + Read + Seek + Send {}
 
-impl<T: Read + Seek + Send> Input for T {}
+impl<T: Debug + Read + Seek + Send> Input for T {}
 
 /// An open file.
+#[derive(Debug)]
 pub struct Opened {
     size: u64,
     input: Box<dyn Input>,
@@ -106,7 +107,7 @@ pub struct Opened {
 
 impl Opened {
     /// A file in memory.
-    pub fn memory(bytes: impl AsRef<[u8]> + Send + 'static) -> Opened {
+    pub fn memory(bytes: impl AsRef<[u8]> + Debug + Send + 'static) -> Opened {
         Opened { size: bytes.as_ref().len() as u64, input: Box::new(Cursor::new(bytes)) }
     }
 

@@ -11,14 +11,12 @@ use serde::{Deserialize, Serialize};
 use super::colours::colours;
 use super::picture::{encoded, read_png, write_png};
 use super::{Area, DotMap, Sheet, check_stacks};
-use files::{FileError, read_toml, write_toml};
+use files::{FileError, FolderKind, write_toml};
 use readers::exact::Exact;
 
-/// The text of a sheet.
-const SHEET: &str = "sheet.toml";
+const SHEET: FolderKind = FolderKind { name: "sheet", text: "sheet.toml", command: "layout" };
 
-/// The text of a dot map.
-const DOTS: &str = "dots.toml";
+const DOTS: FolderKind = FolderKind { name: "dot map", text: "dots.toml", command: "halftone" };
 
 /// The picture beside the text.
 const PICTURE: &str = "separation.png";
@@ -127,7 +125,7 @@ impl DotMap {
     /// # Errors
     /// A map larger than any sheet of paper, and what the system refuses.
     pub fn save(&self, folder: &Path) -> Result<(), FileError> {
-        let path = folder.join(DOTS);
+        let path = folder.join(DOTS.text);
         let side = |dots: usize, most: u16| u16::try_from(dots).ok().filter(|&dots| dots <= most);
         let (Some(width), Some(length)) = (side(self.width(), LARGEST.0), side(self.length(), LARGEST.1))
         else {
@@ -150,8 +148,8 @@ impl DotMap {
     /// # Errors
     /// Files that cannot be read, or are not what was written.
     pub fn load(folder: &Path) -> Result<DotMap, FileError> {
-        let path = folder.join(DOTS);
-        let text: DotsText = read_toml(&path)?;
+        let path = folder.join(DOTS.text);
+        let text: DotsText = DOTS.read(folder)?;
         let wrong = |problem: String| FileError::Text { path: path.clone(), problem };
         check(text.format, &text.picture, &text.stacks).map_err(wrong)?;
         let (width, length) = (text.width, text.length);
@@ -182,7 +180,7 @@ impl Sheet {
             stacks: self.stacks().to_vec(),
             paper: PaperText::new(self.paper()),
         };
-        write_toml(&folder.join(SHEET), &text)
+        write_toml(&folder.join(SHEET.text), &text)
     }
 
     /// An area of the sheet in false colours as PNG, one colour for each stack, a pixel a dot. The sheet has `dpi` dots per inch
@@ -204,8 +202,8 @@ impl Sheet {
     /// # Errors
     /// Files that cannot be read, or are not what was written.
     pub fn load(folder: &Path) -> Result<Sheet, FileError> {
-        let path = folder.join(SHEET);
-        let text: SheetText = read_toml(&path)?;
+        let path = folder.join(SHEET.text);
+        let text: SheetText = SHEET.read(folder)?;
         let wrong = |problem: String| FileError::Text { path: path.clone(), problem };
         check(text.format, &text.picture, &text.stacks).map_err(wrong)?;
         let paper = text.paper.paper().map_err(wrong)?;
@@ -246,8 +244,8 @@ mod tests {
         let dots = sheet(9, 7, 3, 1).dots;
         dots.save(folder.path()).unwrap();
         assert_eq!(DotMap::load(folder.path()).unwrap(), dots);
-        assert!(Sheet::load(folder.path()).unwrap_err().to_string().contains(SHEET));
-        let path = folder.path().join(DOTS);
+        assert!(Sheet::load(folder.path()).unwrap_err().to_string().contains(SHEET.text));
+        let path = folder.path().join(DOTS.text);
         let good = std::fs::read_to_string(&path).unwrap();
         for (from, to, words) in [
             ("format = 1", "format = 9", "format: 9"),
@@ -275,13 +273,13 @@ mod tests {
         let mut names: Vec<_> =
             std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
         names.sort();
-        assert_eq!(names, [PICTURE, SHEET]);
+        assert_eq!(names, [PICTURE, SHEET.text]);
     }
 
     #[test]
     fn a_file_that_does_not_fit_is_named_with_its_field() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(SHEET);
+        let path = folder.path().join(SHEET.text);
         sheet(9, 7, 3, 1).save(folder.path()).unwrap();
         let good = std::fs::read_to_string(&path).unwrap();
         let error = |text: String| {

@@ -6,6 +6,7 @@
 use std::io::BufReader;
 use std::path::Path;
 
+use files::shelf::{Disk, Shelf as _};
 use files::{FileError, io, write};
 use readers::exact::{self, Exact, Inexact};
 
@@ -33,7 +34,7 @@ pub fn write_png(
 /// Reads a picture that must be of this size and kind; for an indexed one the colours may differ, not their
 /// number.
 pub fn read_png(path: &Path, size: (usize, usize), kind: Exact) -> Result<Vec<u8>, FileError> {
-    let file = std::fs::File::open(path).map_err(io(path, "open"))?;
+    let file = Disk.open(path).map_err(io(path, "open"))?;
     exact::read(BufReader::new(file), size, kind).map_err(|error| {
         let path = path.to_path_buf();
         match error {

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use files::shelf::Disk;
 use serde_json::Value;
 use testing::program::{Bench, entries, small_document, text};
 
@@ -136,7 +137,7 @@ fn curves_of_other_instruments_join_a_library() {
         entries(&bench.path("mine")),
         ["k.csv", "library.toml", "ms.csv", "p-sf.csv", "substrate.csv"]
     );
-    let library = inks::Library::from_dir(&bench.path("mine")).expect("a library");
+    let library = inks::Library::open(&Disk, &bench.path("mine")).expect("a library");
     let at =
         |stack: &str| library.entry(&stack.parse().expect("a stack")).expect("it is there").curve.at(0.4);
     assert!(

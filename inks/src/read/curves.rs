@@ -2,8 +2,11 @@
 //!
 //! A file's name may not lead out of the folder, its length is bounded, and what is wrong in it is found with its line.
 
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
+use files::shelf::inside;
+
+use super::Folder;
 use super::fields::{MOST_CURVE_BYTES, parse_stack, provenance, text};
 use crate::curve::{Curve, CurveError};
 use crate::format::MeasuredTable;
@@ -32,7 +35,7 @@ pub(super) struct Listing {
 pub(super) fn given(
     table: &MeasuredTable,
     word: &str,
-    folder: Option<&Path>,
+    folder: Option<Folder<'_>>,
     wanted: &mut Vec<Listing>,
     findings: &mut Findings,
 ) {
@@ -42,7 +45,9 @@ pub(super) fn given(
     provenance(&owner, &format!("{word} curve"), [&table.by, &table.when, &table.setup], findings);
     let field = format!("{owner}.curve");
     let curve = match path_of(folder, table.curve.get_ref()) {
-        Ok(path) => curve(&path, findings, table.curve.span().start, &field).map(|(c, u)| (c, u, path)),
+        Ok((folder, path)) => {
+            curve(folder, &path, findings, table.curve.span().start, &field).map(|(c, u)| (c, u, path))
+        }
         Err(problem) => {
             findings.error(Some(table.curve.span().start), field, problem);
             None
@@ -71,23 +76,23 @@ pub(super) fn given(
 }
 
 /// The path of a file inside the folder; names that lead out of it are errors.
-fn path_of(folder: Option<&Path>, name: &str) -> Result<PathBuf, String> {
+fn path_of<'a>(folder: Option<Folder<'a>>, name: &str) -> Result<(Folder<'a>, PathBuf), String> {
     let folder = folder.ok_or("a library without a folder cannot have curve files")?;
-    let plain = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
-    if name.is_empty() || !plain {
-        return Err(format!("`{name}` must be the name of a file inside the library's folder"));
-    }
-    Ok(folder.join(name))
+    let path = inside(folder.path, name);
+    let path =
+        path.ok_or_else(|| format!("`{name}` must be the name of a file inside the library's folder"))?;
+    Ok((folder, path))
 }
 
 /// Reads a curve and its standard deviations, if it has them.
 fn curve(
+    folder: Folder<'_>,
     path: &Path,
     findings: &mut Findings,
     offset: usize,
     field: &str,
 ) -> Option<(Curve, Option<Uncertainty>)> {
-    let text = match text(path, MOST_CURVE_BYTES) {
+    let text = match text(folder.shelf, path, MOST_CURVE_BYTES) {
         Ok(text) => text,
         Err(problem) => {
             findings.error(Some(offset), field, format!("{}: {problem}", path.display()));
@@ -115,15 +120,15 @@ fn curve(
 }
 
 /// Warns about curves in the folder that the library does not use, probably by mistake.
-pub(super) fn unused(folder: &Path, named: &[String], findings: &mut Findings) {
-    let Ok(list) = std::fs::read_dir(folder) else { return };
-    let mut unused: Vec<PathBuf> = list
-        .filter_map(|file| Some(file.ok()?.path()))
+pub(super) fn unused(Folder { shelf, path: folder }: Folder<'_>, named: &[String], findings: &mut Findings) {
+    let unused = shelf
+        .list(folder)
+        .unwrap_or_default()
+        .into_iter()
+        .map(|(name, _)| folder.join(name))
         .filter(|path| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")))
-        .filter(|path| !named.iter().any(|name| folder.join(name) == *path))
-        .collect();
-    unused.sort();
-    for file in unused.into_iter().take(100) {
+        .filter(|path| !named.iter().any(|name| folder.join(name) == *path));
+    for file in unused.take(100) {
         findings.found.push(Problem {
             file,
             line: None,

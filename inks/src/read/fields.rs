@@ -1,8 +1,9 @@
 //! Single fields of a library and of its files, checked: texts of bounded length, stacks, and who measured when and how.
 
-use std::io::Read;
 use std::path::Path;
 
+use files::FileError;
+use files::shelf::Shelf;
 use toml::Spanned;
 
 use crate::problem::Findings;
@@ -14,14 +15,14 @@ const MOST_LAYERS: usize = 16;
 pub(crate) const MOST_CURVE_BYTES: u64 = 16 << 20;
 
 /// Reads a text file of at most `most` bytes.
-pub(crate) fn text(path: &Path, most: u64) -> Result<String, String> {
-    let file = std::fs::File::open(path).map_err(|error| error.to_string())?;
-    let mut text = String::new();
-    file.take(most + 1).read_to_string(&mut text).map_err(|error| error.to_string())?;
-    if text.len() as u64 > most {
-        return Err(format!("the file is longer than {most} bytes"));
-    }
-    Ok(text)
+pub(super) fn text(shelf: &dyn Shelf, path: &Path, most: u64) -> Result<String, String> {
+    let bytes = shelf.read(path, most).map_err(|error| match error {
+        // Whoever reads this knows the file already.
+        FileError::Io { source, .. } => source.to_string(),
+        FileError::Large { .. } => format!("the file is longer than {most} bytes"),
+        other => other.to_string(),
+    })?;
+    String::from_utf8(bytes).map_err(|error| format!("not UTF-8 text: {error}"))
 }
 
 /// Parses a stack, and reports an error if that fails.

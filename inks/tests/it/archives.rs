@@ -5,6 +5,7 @@ use std::io::{Cursor, Write as _};
 use std::path::Path;
 use std::process::Command;
 
+use files::shelf::Disk;
 use inks::archive::{Member, PROVENANCE, gather, pack, place, unpack};
 use inks::{Library, Stack};
 use zip::write::SimpleFileOptions;
@@ -24,8 +25,8 @@ fn folder() -> tempfile::TempDir {
 }
 
 fn packed(folder: &Path) -> Vec<u8> {
-    let library = Library::from_dir(folder).unwrap();
-    pack(&gather(folder).unwrap(), &library, Some("CC0-1.0")).unwrap()
+    let library = Library::open(&Disk, folder).unwrap();
+    pack(&gather(&Disk, folder).unwrap(), &library, Some("CC0-1.0")).unwrap()
 }
 
 #[test]
@@ -36,17 +37,17 @@ fn what_was_packed_comes_out() {
     let to = tempfile::tempdir().unwrap();
     let members = unpack(&archive).unwrap();
     place(&members, to.path()).unwrap();
-    let mut library = Library::from_dir(to.path()).unwrap();
+    let mut library = Library::open(&Disk, to.path()).unwrap();
     assert_eq!(library.licence(), Some("CC0-1.0"));
     let stack: Stack = "MS+C".parse().unwrap();
-    assert_eq!(library.entry(&stack), Library::from_dir(from.path()).unwrap().entry(&stack));
+    assert_eq!(library.entry(&stack), Library::open(&Disk, from.path()).unwrap().entry(&stack));
     assert!(!to.path().join("thesis.txt").exists());
     // What was imported can be exported, with the licence it has and no other.
-    let again = gather(to.path()).unwrap();
+    let again = gather(&Disk, to.path()).unwrap();
     assert!(pack(&again, &library, None).is_ok());
     assert!(pack(&again, &library, Some("MIT")).unwrap_err().to_string().contains("not MIT"));
-    library = Library::from_dir(from.path()).unwrap();
-    let error = pack(&gather(from.path()).unwrap(), &library, None).unwrap_err().to_string();
+    library = Library::open(&Disk, from.path()).unwrap();
+    let error = pack(&gather(&Disk, from.path()).unwrap(), &library, None).unwrap_err().to_string();
     assert!(error.contains("no licence"), "{error}");
     assert!(place(&members, to.path()).is_err(), "nothing is overwritten");
 }
@@ -204,8 +205,8 @@ fn bombs_are_refused_before_they_burst() {
 #[test]
 fn what_the_provenance_does_not_list_is_refused() {
     let from = folder();
-    let library = Library::from_dir(from.path()).unwrap();
-    let members = gather(from.path()).unwrap();
+    let library = Library::open(&Disk, from.path()).unwrap();
+    let members = gather(&Disk, from.path()).unwrap();
     let archive = pack(&members, &library, Some("CC0-1.0")).unwrap();
     let mut changed = unpack(&archive).unwrap();
     let again = |members: &[Member]| {

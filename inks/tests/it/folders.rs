@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use files::shelf::Disk;
 use inks::{Library, LibraryError, Problem, Provenance, Severity, Stack};
 use proptest::prelude::*;
 use protocol::ink::Ink;
@@ -19,7 +20,7 @@ fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
 }
 
 fn check(files: &[(&str, &str)]) -> Vec<Problem> {
-    Library::check(folder(files).path())
+    Library::check(&Disk, folder(files).path())
 }
 
 fn measured(stack: &str, curve: &str) -> String {
@@ -45,7 +46,7 @@ fn one_error(files: &[(&str, &str)], words: &[&str]) {
 #[test]
 fn the_builtin_text_in_a_folder_is_the_builtin_library() {
     let folder = folder(&[("library.toml", BUILTIN)]);
-    assert_eq!(Library::from_dir(folder.path()).unwrap(), Library::builtin());
+    assert_eq!(Library::open(&Disk, folder.path()).unwrap(), Library::builtin());
 }
 
 #[test]
@@ -55,7 +56,7 @@ fn a_measurement_replaces_one_curve_and_says_so() {
         ("library.toml", &text),
         ("ms-c.csv", "theta_h_deg,r,g,b\n0,0.4,0.5,0.6\n10,0.1,0.1,0.1\n"),
     ]);
-    let library = Library::from_dir(folder.path()).unwrap();
+    let library = Library::open(&Disk, folder.path()).unwrap();
     let stack: Stack = "MS+C".parse().unwrap();
     let entry = library.entry(&stack).unwrap();
     assert_eq!(entry.curve.at(0.0), [0.4, 0.5, 0.6]);
@@ -70,7 +71,7 @@ fn a_measurement_replaces_one_curve_and_says_so() {
 fn a_measured_stack_the_library_lacks_joins_it() {
     let text = measured("W", "white.csv");
     let folder = folder(&[("library.toml", &text), ("white.csv", "theta_h_deg,r,g,b\n0,0.2,0.2,0.2\n")]);
-    let library = Library::from_dir(folder.path()).unwrap();
+    let library = Library::open(&Disk, folder.path()).unwrap();
     assert_eq!(library.entries().len(), 58);
     assert_eq!(library.entries()[57].stack.layers(), [Ink::White]);
     assert!(library.at_hand(&"white".parse().unwrap()).len() == 2);
@@ -87,7 +88,7 @@ fn a_measured_figure_of_an_ink_changes_every_stack_with_it() {
     );
     assert_ne!(ink, changed);
     let folder = folder(&[("library.toml", &format!("{BASED}[[ink]]\n{changed}"))]);
-    let library = Library::from_dir(folder.path()).unwrap();
+    let library = Library::open(&Disk, folder.path()).unwrap();
     for (old, new) in Library::builtin().entries().iter().zip(library.entries()) {
         let holds = new.stack.layers().contains(&Ink::MetallicSilver);
         assert_eq!(old.curve != new.curve, holds, "{}", new.stack);
@@ -230,7 +231,7 @@ fn foil_without_its_undercoat_gives_a_finding_with_its_line() {
 
 #[test]
 fn an_invalid_library_is_an_error_with_its_path() {
-    let error = Library::from_dir(Path::new("/nowhere/at/all")).unwrap_err();
+    let error = Library::open(&Disk, Path::new("/nowhere/at/all")).unwrap_err();
     let LibraryError::Problems { problems } = &error;
     assert_eq!(problems.len(), 1);
     assert!(error.to_string().contains("/nowhere/at/all/library.toml"), "{error}");
@@ -256,7 +257,7 @@ fn the_examples_of_the_guide_are_libraries() {
     assert_eq!(examples.len(), 3);
     let library = |example: &str| {
         let folder = folder(&[("library.toml", example), ("ms-c.csv", curve)]);
-        Library::from_dir(folder.path()).unwrap()
+        Library::open(&Disk, folder.path()).unwrap()
     };
     for (example, changed) in examples.iter().zip(["MS+C", "K+F"]) {
         let stack: Stack = changed.parse().unwrap();
@@ -283,7 +284,7 @@ proptest! {
         let end = (at + cut).min(BUILTIN.len());
         let text = format!("{}{put}{}", &BUILTIN[..at], &BUILTIN[end..]);
         let folder = folder(&[("library.toml", &text)]);
-        match Library::from_dir(folder.path()) {
+        match Library::open(&Disk, folder.path()) {
             Ok(library) => prop_assert!(library.entries()[0].stack == Stack::SUBSTRATE),
             Err(LibraryError::Problems { problems }) => {
                 prop_assert!(problems.iter().any(|p| p.severity == Severity::Error));
@@ -295,7 +296,7 @@ proptest! {
     fn a_damaged_curve_gives_findings(rows in prop::collection::vec("[-0-9.,eEnNaAiIfF \"]{0,24}", 0..12)) {
         let curve = format!("theta_h_deg,r,g,b\n{}", rows.join("\n"));
         let folder = folder(&[("library.toml", &measured("C", "c.csv")), ("c.csv", &curve)]);
-        if let Ok(library) = Library::from_dir(folder.path()) {
+        if let Ok(library) = Library::open(&Disk, folder.path()) {
             prop_assert!(library.entries().iter().all(|e| e.curve.rgb().iter().flatten().all(|v| v.is_finite())));
         }
     }
@@ -311,7 +312,7 @@ fn dots_as_measured_override_the_minimum_clusters_and_say_who_measured() {
     };
     let text = format!("{head}{}{}", dots("black", "dot_gain_um = 17.5\n"), dots("paper", ""));
     let here = folder(&[("library.toml", &text)]);
-    let library = Library::from_dir(here.path()).unwrap();
+    let library = Library::open(&Disk, here.path()).unwrap();
     let black = library.cartridge(Ink::Black).unwrap();
     assert_eq!((black.minimum_cluster.get(), black.minimum_cluster.source()), (11, inks::Source::Measured));
     assert_eq!(black.dots.as_ref().unwrap().dot_gain_um, Some(17.5));
@@ -320,7 +321,7 @@ fn dots_as_measured_override_the_minimum_clusters_and_say_who_measured() {
     assert_eq!(library.minimum_cluster(&"C".parse().unwrap()), 11);
     assert_eq!(library.minimum_cluster(&"MS".parse().unwrap()), 16);
     let guide = folder(&[("library.toml", &format!("{head}{}", blocks("toml dots")[0]))]);
-    let library = Library::from_dir(guide.path()).unwrap();
+    let library = Library::open(&Disk, guide.path()).unwrap();
     assert_eq!(library.cartridge(Ink::Black).unwrap().minimum_cluster.get(), 9);
     for (tables, words) in [
         (dots("black", "").replace("= 11", "= 0"), ["dots black.minimum_cluster", "0 dots"]),

@@ -3,7 +3,10 @@
 //! Columns: stack, diffuse albedo, lobes (F0, alpha), green reflectance at half angles of 0, 10 and 30 degrees in 1/sr
 //! to three significant digits.
 
-use inks::{Library, Stack};
+use std::path::Path;
+
+use files::shelf::Disk;
+use inks::{Curve, Library, Stack};
 use testing::needs::data;
 
 struct Row {
@@ -194,8 +197,7 @@ fn the_metal_is_aluminium() {
 #[test]
 fn silver_flakes_peak_like_a_measured_silver_paint() {
     let Some(data) = data() else { return };
-    let paint =
-        inks::Curve::read_csv(&data.join("brdf/curves_colocated/merl_silver-metallic-paint.csv")).unwrap();
+    let paint = read(&data.join("brdf/curves_colocated/merl_silver-metallic-paint.csv"));
     let library = Library::builtin();
     let flakes = &library.entries()[8];
     assert_eq!(flakes.stack.to_string(), "MS");
@@ -217,15 +219,24 @@ fn real_measurements_are_read_and_judged_by_their_energy() {
                 continue;
             }
             count += 1;
-            let curve = inks::Curve::read_csv(&path).unwrap();
+            let curve = read(&path);
             let most = quadratures.iter().flat_map(|q| q.of_curve(&curve)).fold(0.0, f64::max);
             let folder = tempfile::tempdir().unwrap();
             std::fs::copy(&path, folder.path().join("c.csv")).unwrap();
             let text = "format = 1\nbased_on = \"built-in\"\n[[measured]]\nstack = \"C\"\ncurve = \"c.csv\"\n\
                         by = \"x\"\nwhen = \"2010-01\"\nsetup = \"x\"\n";
             std::fs::write(folder.path().join("library.toml"), text).unwrap();
-            assert_eq!(Library::from_dir(folder.path()).is_ok(), most <= 1.05, "{}: {most}", path.display());
+            assert_eq!(
+                Library::open(&Disk, folder.path()).is_ok(),
+                most <= 1.05,
+                "{}: {most}",
+                path.display()
+            );
         }
     }
     assert!(count > 50, "{count}");
+}
+
+fn read(path: &Path) -> Curve {
+    Curve::from_csv(std::fs::File::open(path).unwrap(), path).unwrap()
 }

@@ -2,6 +2,7 @@
 
 use std::fs;
 
+use files::shelf::Disk;
 use inks::{Certainty, Library, LibraryError, Severity, Stack};
 
 fn stack(text: &str) -> Stack {
@@ -17,7 +18,7 @@ fn based(text: &str) -> Result<Library, LibraryError> {
     let folder = tempfile::tempdir().unwrap();
     let text = format!("format = 1\nbased_on = \"built-in\"\n{text}");
     fs::write(folder.path().join("library.toml"), text).unwrap();
-    Library::from_dir(folder.path())
+    Library::open(&Disk, folder.path())
 }
 
 fn rule(name: &str, severity: &str, condition: &str) -> String {

@@ -1,4 +1,4 @@
-//! A zip archive as a folder: a material as it was downloaded.
+//! A zip archive as a shelf: a material as it was downloaded.
 //!
 //! Problem: material sites hand out zip files. They come from strangers, so nothing in them is believed.
 //! Method: files are read where they lie in the archive and nothing is written to disk. Names must stay inside; no entry may be a
@@ -7,17 +7,16 @@
 //! Cost: one file at a time in memory. Limits: stored or deflated entries; what macOS adds under `__MACOSX` is left out.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
+use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom};
 use std::path::{Component, Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
+use files::FileError;
+use files::shelf::{Kind, MOST_NAMES, Opened, Shelf};
 use zip::ZipArchive;
 
 use super::error::DocumentError;
 use super::source::MOST_BYTES;
-
-/// The most entries.
-pub(super) const MOST_ENTRIES: usize = 10_000;
 
 /// The most bytes that come out of one archive, of all the files that are read.
 const MOST_OUT: u64 = 4 * MOST_BYTES;
@@ -26,36 +25,42 @@ const MOST_OUT: u64 = 4 * MOST_BYTES;
 const TAIL: u64 = 22 + 0xffff;
 
 /// A zip archive whose table of contents was read.
+#[derive(Debug)]
 pub(super) struct Archive {
     path: PathBuf,
-    zip: ZipArchive<BufReader<File>>,
     /// The number of each file by its path inside.
     files: BTreeMap<PathBuf, usize>,
+    open: Mutex<Open>,
+}
+
+#[derive(Debug)]
+struct Open {
+    zip: ZipArchive<BufReader<Opened>>,
+    /// The bytes that may still come out.
     left: u64,
 }
 
 impl Archive {
     /// Opens the archive of this path.
-    pub(super) fn open(path: &Path, mut file: File) -> Result<Archive, DocumentError> {
+    pub(super) fn open(path: &Path, mut file: Opened) -> Result<Archive, DocumentError> {
         let wrong = |field: &str, problem: String| DocumentError::Field {
             path: path.to_path_buf(),
             field: field.into(),
             problem,
         };
         let broken = |error: zip::result::ZipError| wrong("zip", format!("cannot be read: {error}"));
-        let io = |source| DocumentError::Io { path: path.to_path_buf(), attempt: "read", source };
         let many = |found| DocumentError::Large {
             path: path.to_path_buf(),
             field: "the number of files".into(),
             found,
-            most: MOST_ENTRIES as u64,
+            most: MOST_NAMES as u64,
         };
-        let counted = entries(&mut file).map_err(io)?;
-        if counted > MOST_ENTRIES as u64 {
+        let counted = entries(&mut file).map_err(files::io(path, "read"))?;
+        if counted > MOST_NAMES as u64 {
             return Err(many(counted));
         }
         let mut zip = ZipArchive::new(BufReader::new(file)).map_err(broken)?;
-        if zip.len() > MOST_ENTRIES {
+        if zip.len() > MOST_NAMES {
             return Err(many(zip.len() as u64));
         }
         if zip.has_duplicate_names() || zip.has_overlapping_entries().map_err(broken)? {
@@ -81,65 +86,72 @@ impl Archive {
                 files.insert(PathBuf::from(name), number);
             }
         }
-        Ok(Archive { path: path.to_path_buf(), zip, files, left: MOST_OUT })
+        let open = Mutex::new(Open { zip, left: MOST_OUT });
+        Ok(Archive { path: path.to_path_buf(), files, open })
     }
 
-    /// The path inside, if the path leads into this archive.
-    pub(super) fn inside<'p>(&self, path: &'p Path) -> Option<&'p Path> {
-        path.strip_prefix(&self.path).ok()
+    /// The path inside.
+    fn inside<'p>(&self, path: &'p Path) -> io::Result<&'p Path> {
+        path.strip_prefix(&self.path).map_err(|_| io::ErrorKind::NotFound.into())
+    }
+}
+
+impl Shelf for Archive {
+    fn kind(&self, path: &Path) -> io::Result<Kind> {
+        let inside = self.inside(path)?;
+        match () {
+            () if self.files.contains_key(inside) => Ok(Kind::File),
+            () if inside.as_os_str().is_empty() => Ok(Kind::Folder),
+            () if self.files.keys().any(|file| file.starts_with(inside)) => Ok(Kind::Folder),
+            () => Err(io::ErrorKind::NotFound.into()),
+        }
     }
 
-    pub(super) fn is_file(&self, inside: &Path) -> bool {
-        self.files.contains_key(inside)
-    }
-
-    pub(super) fn is_folder(&self, inside: &Path) -> bool {
-        inside.as_os_str().is_empty()
-            || self.files.keys().any(|file| file != inside && file.starts_with(inside))
-    }
-
-    /// The names in a folder, and whether each is a folder.
-    pub(super) fn list(&self, inside: &Path) -> BTreeMap<String, bool> {
+    fn list(&self, folder: &Path) -> io::Result<Vec<(String, Kind)>> {
+        let inside = self.inside(folder)?;
         let mut list = BTreeMap::new();
         for file in self.files.keys() {
             let Ok(rest) = file.strip_prefix(inside) else { continue };
             let mut parts = rest.components();
             if let Some(first) = parts.next() {
-                list.insert(first.as_os_str().to_string_lossy().into_owned(), parts.next().is_some());
+                let kind = if parts.next().is_some() { Kind::Folder } else { Kind::File };
+                list.insert(first.as_os_str().to_string_lossy().into_owned(), kind);
             }
         }
-        list
+        Ok(list.into_iter().collect())
     }
 
-    /// The first bytes of a file, at most 16.
-    pub(super) fn head(&mut self, inside: &Path) -> std::io::Result<Vec<u8>> {
-        let number = *self.files.get(inside).ok_or(std::io::ErrorKind::NotFound)?;
-        let entry = self.zip.by_index(number).map_err(std::io::Error::other)?;
-        let mut bytes = Vec::new();
-        entry.take(16).read_to_end(&mut bytes)?;
-        Ok(bytes)
+    fn open(&self, path: &Path) -> io::Result<Opened> {
+        Ok(Opened::memory(self.start(path, MOST_BYTES)?))
     }
 
-    /// The bytes of a file, at most `most + 1`.
-    pub(super) fn read(&mut self, inside: &Path, most: u64) -> std::io::Result<Vec<u8>> {
-        let number = *self.files.get(inside).ok_or(std::io::ErrorKind::NotFound)?;
-        let entry = self.zip.by_index(number).map_err(std::io::Error::other)?;
+    fn start(&self, path: &Path, most: u64) -> io::Result<Vec<u8>> {
+        let number = *self.files.get(self.inside(path)?).ok_or(io::ErrorKind::NotFound)?;
+        let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
+        let left = open.left;
+        let entry = open.zip.by_index(number).map_err(io::Error::other)?;
         let mut bytes = Vec::new();
         // What the archive says about sizes is not believed.
-        entry.take(most.saturating_add(1).min(self.left + 1)).read_to_end(&mut bytes)?;
-        if bytes.len() as u64 > self.left {
-            return Err(std::io::Error::other(format!(
-                "the files of the archive hold more than {} GiB",
-                MOST_OUT >> 30
-            )));
-        }
-        self.left -= bytes.len() as u64;
+        entry.take(most.min(left + 1)).read_to_end(&mut bytes)?;
+        let Some(left) = left.checked_sub(bytes.len() as u64) else {
+            let gib = MOST_OUT >> 30;
+            return Err(io::Error::other(format!("the files of the archive hold more than {gib} GiB")));
+        };
+        open.left = left;
         Ok(bytes)
+    }
+
+    fn read(&self, path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
+        let bytes = self.start(path, most.saturating_add(1)).map_err(files::io(path, "read"))?;
+        match bytes.len() as u64 {
+            found if found > most => Err(FileError::Large { path: path.to_path_buf(), found, most }),
+            _ => Ok(bytes),
+        }
     }
 }
 
 /// The most entries that any record at the end of the file states.
-fn entries(file: &mut File) -> std::io::Result<u64> {
+fn entries(file: &mut Opened) -> io::Result<u64> {
     let length = file.seek(SeekFrom::End(0))?;
     file.seek(SeekFrom::Start(length.saturating_sub(TAIL + 76)))?;
     let mut tail = Vec::new();

@@ -1,7 +1,9 @@
 //! What a document is, and the choices in reading one.
 
 use std::path::Path;
+use std::sync::Arc;
 
+use files::shelf::{Disk, Shelf};
 use serde::{Deserialize, Serialize};
 
 use crate::materials::{Factored, Materials, Surfaces, Uniform};
@@ -24,7 +26,7 @@ pub enum ColourSpace {
 }
 
 /// The choices in reading a document.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Options {
     /// The material to read from a file with several: its number, counted from 0, or its name.
     pub material: Option<String>,
@@ -32,11 +34,13 @@ pub struct Options {
     pub colour_space: Option<ColourSpace>,
     /// Samples of the half angle, 1 to 4096.
     pub samples: usize,
+    /// Where its files stand.
+    pub shelf: Arc<dyn Shelf>,
 }
 
 impl Default for Options {
     fn default() -> Options {
-        Options { material: None, colour_space: None, samples: SAMPLES }
+        Options { material: None, colour_space: None, samples: SAMPLES, shelf: Arc::new(Disk) }
     }
 }
 
@@ -92,10 +96,10 @@ const ENDINGS: [&str; 6] = ["foil", "mix", "dots", "sheet", "passes", "print"];
 
 /// The name of what is stored at a path: a file's without its ending, a folder's as it is, dots included, without an ending of
 /// this program's own.
-pub fn name_of(path: &Path) -> String {
+pub fn name_of(shelf: &dyn Shelf, path: &Path) -> String {
     let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let own = || whole.extension().is_some_and(|ending| ENDINGS.iter().any(|own| ending == *own));
-    let name = if whole.is_dir() && !own() { whole.file_name() } else { whole.file_stem() };
+    let name = if shelf.is_folder(path) && !own() { whole.file_name() } else { whole.file_stem() };
     name.map_or_else(|| "document".into(), |name| name.to_string_lossy().into_owned())
 }
 
@@ -121,8 +125,8 @@ mod tests {
         {
             let path = folder.path().join(name);
             std::fs::create_dir(&path).unwrap();
-            assert_eq!(name_of(&path), expected);
+            assert_eq!(name_of(&Disk, &path), expected);
         }
-        assert_eq!(name_of(Path::new("of/leaf.v2.binary")), "leaf.v2");
+        assert_eq!(name_of(&Disk, Path::new("of/leaf.v2.binary")), "leaf.v2");
     }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use inks::Curve;
 
-use super::content::{Content, Document, SWATCH_MM, name_of};
+use super::content::{Content, Document, SWATCH_MM};
 use super::error::DocumentError;
 use super::source::Source;
 use crate::brdf::Space;
@@ -48,9 +48,10 @@ pub(super) fn document(
         field: "reflectance".into(),
         problem: error.to_string(),
     })?;
+    let name = source.name_of(path);
     let (notes, digest) = source.finish();
     Ok(Document {
-        name: name_of(path),
+        name,
         content: Content::Uniform(uniform),
         size_mm: Some((SWATCH_MM, SWATCH_MM)),
         notes,

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use files::FileError;
 use inks::CurveError;
 
 use crate::sample::UnknownSample;
@@ -10,16 +11,9 @@ use crate::weights::WeightError;
 /// Why a document could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum DocumentError {
-    /// The system could not read or write a file.
-    #[error("{}: cannot {attempt}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What was attempted.
-        attempt: &'static str,
-        /// The error of the system.
-        source: std::io::Error,
-    },
+    /// A file is missing, too large, or cannot be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// The path is not a kind of document.
     #[error(
         "{}: unknown kind of document; expected a folder of texture maps or its .zip, a factored document, a .gltf, .glb, .mtlx, \
@@ -49,7 +43,7 @@ pub enum DocumentError {
         /// The requested number.
         found: usize,
     },
-    /// A file, or something it declares, is implausibly large.
+    /// Something that a file declares is implausibly large.
     #[error("{}: {field} is {found}; the limit is {most}", path.display())]
     Large {
         /// The file.

@@ -5,15 +5,17 @@
 //! rounding to 16 bits. Writing fills a temporary folder and renames it at the end.
 
 use std::collections::BTreeMap;
-use std::io::Write;
+use std::io::Write as _;
 use std::path::Path;
 
+use files::FolderKind;
+use files::shelf::Shelf;
 use inks::Curve;
 use serde::{Deserialize, Serialize};
 
 use observe::Observer;
 
-use super::content::{Content, Document, check_size_mm, name_of};
+use super::content::{Content, Document, check_size_mm};
 use super::error::DocumentError;
 use super::picture::{MOST_PIXELS, Picture};
 use super::source::{MOST_BYTES, Source};
@@ -22,8 +24,9 @@ use crate::materials::{Factored, check_reflectance};
 use crate::weights::WeightMaps;
 use crate::weights::grey::{from_greys, to_grey};
 
-/// The file that marks a folder as a factored document.
-pub(super) const INDEX: &str = "document.toml";
+/// The folder, and the file that marks it.
+pub(super) const FOIL: FolderKind =
+    FolderKind { name: "factored document", text: "document.toml", command: "factor" };
 
 const BASES: &str = "bases.csv";
 
@@ -74,11 +77,6 @@ struct BasisRow {
     b: f64,
 }
 
-fn io(path: &Path, attempt: &'static str) -> impl FnOnce(std::io::Error) -> DocumentError {
-    let path = path.to_path_buf();
-    move |source| DocumentError::Io { path, attempt, source }
-}
-
 /// Writes a factored document as the folder `path`, which must not exist yet. Only half-angle tabulations can be written,
 /// because the file contains curves. `origin` says what was factored, unless it was edited since.
 pub fn write(
@@ -102,16 +100,7 @@ pub fn write(
             "{bases} bases and {maps} maps; expected equal numbers, at most {MOST_BASES}"
         )));
     }
-    if path.exists() {
-        let exists = std::io::Error::from(std::io::ErrorKind::AlreadyExists);
-        return Err(io(path, "write")(exists));
-    }
-    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let staging =
-        tempfile::Builder::new().prefix(".foil.").tempdir_in(parent).map_err(io(parent, "write in"))?;
-    // A folder inside it, because only the owner can open the temporary folder itself.
-    let inside = staging.path().join("document");
-    std::fs::create_dir(&inside).map_err(io(&inside, "write"))?;
+    files::new_folder(path)?;
     let (width, height) = (factored.maps.width(), factored.maps.height());
     let mut maps = Vec::new();
     let mut row = vec![0u8; 2 * width * height];
@@ -120,28 +109,22 @@ pub fn write(
         for (pixel, out) in row.chunks_exact_mut(2).enumerate() {
             out.copy_from_slice(&to_grey(factored.maps.at(pixel)[basis]).to_ne_bytes());
         }
-        let at = inside.join(&file);
-        let mut output = std::fs::File::create_new(&at).map_err(io(&at, "write"))?;
+        let at = path.join(&file);
         let picture = readers::png(&row, (width as u32, height as u32), readers::Pixel::Grey16)
-            .map_err(io(&at, "write"))?;
-        output.write_all(&picture).map_err(io(&at, "write"))?;
+            .map_err(files::io(&at, "write"))?;
+        files::write(&at, |out| out.write_all(&picture))?;
         maps.push(file);
     }
-    let at = inside.join(BASES);
-    let mut csv = csv::Writer::from_path(&at).map_err(|error| io(&at, "write")(error.into()))?;
-    for (basis, row) in factored.bases.rows().enumerate() {
-        for (theta, value) in angles.iter().zip(row.chunks_exact(3)) {
-            csv.serialize(BasisRow {
-                basis,
-                theta_h_deg: theta.to_degrees(),
-                r: value[0],
-                g: value[1],
-                b: value[2],
-            })
-            .map_err(|error| io(&at, "write")(error.into()))?;
+    files::write(&path.join(BASES), |out| {
+        let mut csv = csv::Writer::from_writer(out);
+        for (basis, row) in factored.bases.rows().enumerate() {
+            for (theta, value) in angles.iter().zip(row.chunks_exact(3)) {
+                let theta_h_deg = theta.to_degrees();
+                csv.serialize(BasisRow { basis, theta_h_deg, r: value[0], g: value[1], b: value[2] })?;
+            }
         }
-    }
-    csv.flush().map_err(io(&at, "write"))?;
+        csv.flush()
+    })?;
     let index = Index {
         format: FORMAT,
         name: name.into(),
@@ -153,29 +136,33 @@ pub fn write(
         maps,
         origin,
     };
-    let at = inside.join(INDEX);
-    let text = toml::to_string(&index).map_err(|error| io(&at, "write")(std::io::Error::other(error)))?;
-    let mut file = std::fs::File::create_new(&at).map_err(io(&at, "write"))?;
-    file.write_all(text.as_bytes()).map_err(io(&at, "write"))?;
-    std::fs::rename(&inside, path).map_err(io(path, "write"))
+    // Last, because a folder without it is no document.
+    Ok(files::write_toml(&path.join(FOIL.text), &index)?)
 }
 
 /// Reads the factored document in the folder `path`.
-pub fn read(path: &Path, observer: &dyn Observer) -> Result<Document, DocumentError> {
-    open(path, Source::new(observer))
+pub fn read(shelf: &dyn Shelf, path: &Path, observer: &dyn Observer) -> Result<Document, DocumentError> {
+    open(path, Source::new(shelf, observer))
 }
 
 /// What the factored document in the folder `path` was made of, if it says so.
 ///
 /// # Errors
 /// A file that cannot be read, or a wrong value in it.
-pub fn origin(path: &Path, observer: &dyn Observer) -> Result<Option<Origin>, DocumentError> {
-    Ok(index(path, &mut Source::new(observer))?.origin)
+pub fn origin(
+    shelf: &dyn Shelf,
+    path: &Path,
+    observer: &dyn Observer,
+) -> Result<Option<Origin>, DocumentError> {
+    Ok(index(path, &mut Source::new(shelf, observer))?.origin)
 }
 
 fn index(path: &Path, source: &mut Source<'_>) -> Result<Index, DocumentError> {
-    let at = path.join(INDEX);
-    let text = source.read_text(&at)?;
+    let at = path.join(FOIL.text);
+    let text = source.read_text(&at).map_err(|error| match error {
+        DocumentError::File(error) => FOIL.unless_missing(source.shelf(), path, error).into(),
+        error => error,
+    })?;
     let wrong = |problem: String| DocumentError::Settings { path: at, problem };
     match toml::from_str(&text) {
         Ok(index) => check(&index).map(|()| index).map_err(wrong),
@@ -221,9 +208,10 @@ pub(super) fn open(path: &Path, mut source: Source<'_>) -> Result<Document, Docu
     }
     let maps = WeightMaps::new(index.width, index.height, channels, data)
         .map_err(|source| DocumentError::Weights { path: path.to_path_buf(), source })?;
+    let name = if index.name.is_empty() { source.name_of(path) } else { index.name };
     let (notes, digest) = source.finish();
     Ok(Document {
-        name: if index.name.is_empty() { name_of(path) } else { index.name },
+        name,
         content: Content::Factored(Factored { space, bases, maps }),
         size_mm: index.size_mm.map(|[w, h]| (w, h)),
         notes,
@@ -312,6 +300,7 @@ fn read_bases(
 mod tests {
     use super::*;
     use crate::weights::quantise;
+    use files::shelf::Disk;
     use observe::Silent;
     use proptest::prelude::*;
 
@@ -347,8 +336,8 @@ mod tests {
             let original = factored(width, height, bases, seed);
             let origin = Origin { document: "ab".into(), result: "cd".into() };
             write(&original, "a thing", Some((12.5, 30.0)), Some(origin.clone()), &path).unwrap();
-            prop_assert_eq!(super::origin(&path, &Silent).unwrap(), Some(origin));
-            let document = read(&path, &Silent).unwrap();
+            prop_assert_eq!(super::origin(&Disk, &path, &Silent).unwrap(), Some(origin));
+            let document = read(&Disk, &path, &Silent).unwrap();
             prop_assert_eq!(document.name.as_str(), "a thing");
             prop_assert_eq!(document.size_mm, Some((12.5, 30.0)));
             prop_assert_eq!(document.as_factored(), Some(&original));
@@ -363,7 +352,7 @@ mod tests {
         let path = folder.path().join("a.foil");
         write(&factored(3, 2, 2, 5), "a", None, None, &path).unwrap();
         std::fs::copy(path.join("weights-00.png"), path.join("weights-01.png")).unwrap();
-        let error = observe::with_causes(&read(&path, &Silent).unwrap_err());
+        let error = observe::with_causes(&read(&Disk, &path, &Silent).unwrap_err());
         assert!(error.contains("a.foil") && error.contains("pixel (0, 0)"), "{error}");
     }
 
@@ -372,7 +361,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.foil");
         write(&factored(2, 2, 1, 5), "a", None, None, &path).unwrap();
-        let text = std::fs::read_to_string(path.join(INDEX)).unwrap();
+        let text = std::fs::read_to_string(path.join(FOIL.text)).unwrap();
         for (from, to, says) in [
             ("samples", "sampels", "sampels"),
             ("weights-00.png", "../weights-00.png", "same folder"),
@@ -381,8 +370,8 @@ mod tests {
             ("format = 1", "format = 2", "format"),
             ("width = 2", "width = 3", "expected 3 x 2"),
         ] {
-            std::fs::write(path.join(INDEX), text.replace(from, to)).unwrap();
-            let error = read(&path, &Silent).unwrap_err().to_string();
+            std::fs::write(path.join(FOIL.text), text.replace(from, to)).unwrap();
+            let error = read(&Disk, &path, &Silent).unwrap_err().to_string();
             assert!(error.contains(says), "{to}: {error}");
         }
     }

@@ -11,7 +11,7 @@ mod settings;
 
 use std::path::Path;
 
-use super::content::{Content, Document, Options, name_of};
+use super::content::{Content, Document, Options};
 use super::error::DocumentError;
 use super::layers::CoatLayer;
 use super::names::{self, Role};
@@ -193,9 +193,10 @@ pub(super) fn open(
         }
     };
     source.observer.end();
+    let name = settings.name.unwrap_or_else(|| source.name_of(folder));
     let (notes, digest) = source.finish();
     Ok(Document {
-        name: settings.name.unwrap_or_else(|| name_of(folder)),
+        name,
         content: Content::Surfaces(surfaces),
         size_mm: settings.size_mm.map(|[w, h]| (w, h)),
         notes,

@@ -12,7 +12,7 @@ mod root;
 
 use std::path::Path;
 
-use super::content::{ColourSpace, Content, Document, Options, SWATCH_MM, name_of};
+use super::content::{ColourSpace, Content, Document, Options, SWATCH_MM};
 use super::error::DocumentError;
 use super::layers::{CoatLayer, Layers, PbrWorkflow, build};
 use super::picture::Picture;
@@ -90,10 +90,11 @@ pub(super) fn open(
     let layers = layers(&mut loader, material, options)?;
     let (surfaces, textured) = build(layers, path, space, &mut source)?;
     source.observer.end();
-    let (notes, digest) = source.finish();
     let name = material.name.clone().filter(|name| !name.trim().is_empty());
+    let name = name.unwrap_or_else(|| format!("{}-{number}", source.name_of(path)));
+    let (notes, digest) = source.finish();
     Ok(Document {
-        name: name.unwrap_or_else(|| format!("{}-{number}", name_of(path))),
+        name,
         content: Content::Surfaces(surfaces),
         size_mm: (!textured).then_some((SWATCH_MM, SWATCH_MM)),
         notes,

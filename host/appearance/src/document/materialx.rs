@@ -13,7 +13,7 @@ use std::path::Path;
 
 use roxmltree::{Node, ParsingOptions};
 
-use super::content::{Content, Document, Options, SWATCH_MM, name_of};
+use super::content::{Content, Document, Options, SWATCH_MM};
 use super::error::DocumentError;
 use super::layers::{CoatLayer, Layers, PbrWorkflow, build};
 use super::picture::Picture;
@@ -167,9 +167,10 @@ pub(super) fn open(
     let layers = reader.layers(shader)?;
     let (surfaces, textured) = build(layers, path, space, &mut source)?;
     source.observer.end();
+    let name = if name.is_empty() { source.name_of(path) } else { name };
     let (notes, digest) = source.finish();
     Ok(Document {
-        name: if name.is_empty() { name_of(path) } else { name },
+        name,
         content: Content::Surfaces(surfaces),
         size_mm: (!textured).then_some((SWATCH_MM, SWATCH_MM)),
         notes,

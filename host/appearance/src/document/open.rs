@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use files::shelf::Shelf;
 use inks::Curve;
 use observe::Observer;
 
@@ -21,7 +22,7 @@ pub fn open(spec: &str, options: &Options, observer: &dyn Observer) -> Result<Do
     }
     let space = Space::half_angle(options.samples);
     let mut path = Path::new(spec);
-    let mut source = Source::new(observer);
+    let mut source = Source::new(&*options.shelf, observer);
     if let Some(name) = spec.strip_prefix("sample:") {
         note_unused_choices(options, &mut source);
         return sample::open(name, space, source);
@@ -32,17 +33,18 @@ pub fn open(spec: &str, options: &Options, observer: &dyn Observer) -> Result<Do
     }
     let found;
     if source.is_folder(path)? {
-        if source.is_file(&path.join(foil::INDEX)) {
+        if source.is_file(&path.join(foil::FOIL.text)) {
             note_unused_choices(options, &mut source);
             return foil::open(path, source);
         }
         match folder::locate(path, &mut source)? {
             folder::Found::Maps(folder) => {
                 note_unused_material(options, &mut source);
+                let name = source.name_of(&folder);
                 let mut document = folder::open(&folder, options, space, source)?;
                 // The folder is named after what it holds, `textures`, the download after the material.
-                if folder != path && document.name == name_of(&folder) {
-                    document.name = name_of(path);
+                if folder != path && document.name == name {
+                    document.name = name_of(&*options.shelf, path);
                 }
                 return Ok(document);
             }
@@ -76,8 +78,8 @@ pub fn open(spec: &str, options: &Options, observer: &dyn Observer) -> Result<Do
 ///
 /// # Errors
 /// Files of another kind, and damage, with its place.
-pub fn measured(path: &Path, observer: &dyn Observer) -> Result<Curve, DocumentError> {
-    let mut source = Source::new(observer);
+pub fn measured(shelf: &dyn Shelf, path: &Path, observer: &dyn Observer) -> Result<Curve, DocumentError> {
+    let mut source = Source::new(shelf, observer);
     let head = source.head(path)?;
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let kind = if head.starts_with(b"tensor_file\0") { "bsdf" } else { &extension };

@@ -10,19 +10,14 @@ use super::source::Source;
 use crate::brdf::Space;
 use crate::sample::{Finish, Sample};
 
-/// Writes a sample as a folder of texture maps. The folder must exist and hold none of the files.
+/// Writes a sample as a folder of texture maps. The folder must exist.
 pub fn write_sample(sample: &Sample, folder: &Path) -> Result<(), DocumentError> {
-    let io = |path: &Path| {
-        let path = path.to_path_buf();
-        move |source| DocumentError::Io { path, attempt: "write", source }
-    };
     let painting = sample.draw();
     for (file, data, kind) in painting.maps() {
         let path = folder.join(file);
-        let mut output = std::fs::File::create_new(&path).map_err(io(&path))?;
-        let picture =
-            readers::png(&data, (painting.width as u32, painting.height as u32), kind).map_err(io(&path))?;
-        output.write_all(&picture).map_err(io(&path))?;
+        let picture = readers::png(&data, (painting.width as u32, painting.height as u32), kind)
+            .map_err(files::io(&path, "write"))?;
+        files::write(&path, |out| out.write_all(&picture))?;
     }
     let settings = FolderSettings {
         name: Some(sample.name.into()),
@@ -34,9 +29,7 @@ pub fn write_sample(sample: &Sample, folder: &Path) -> Result<(), DocumentError>
         }),
         ..FolderSettings::default()
     };
-    let path = folder.join(SETTINGS);
-    let text = toml::to_string(&settings).map_err(|error| io(&path)(std::io::Error::other(error)))?;
-    std::fs::write(&path, text).map_err(io(&path))
+    Ok(files::write_toml(&folder.join(SETTINGS), &settings)?)
 }
 
 /// Opens a sample without touching the disk.

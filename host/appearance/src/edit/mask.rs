@@ -6,6 +6,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use files::shelf::Shelf;
 use observe::Observer;
 
 use super::error::EditError;
@@ -84,10 +85,10 @@ impl Mask {
     ///
     /// # Errors
     /// Numbers that are none or out of range, a picture that cannot be read or is not grey.
-    pub fn open(text: &str, observer: &dyn Observer) -> Result<Mask, EditError> {
+    pub fn open(shelf: &dyn Shelf, text: &str, observer: &dyn Observer) -> Result<Mask, EditError> {
         match Mask::of_maps(text)? {
             Some(mask) => Ok(mask),
-            None => Ok(Mask::Painted(Painted::read(Path::new(text), &mut Source::new(observer))?)),
+            None => Ok(Mask::Painted(Painted::read(Path::new(text), &mut Source::new(shelf, observer))?)),
         }
     }
 

@@ -1,7 +1,9 @@
 //! A curve of another document that takes the place of a basis.
 
 use std::path::Path;
+use std::sync::Arc;
 
+use files::shelf::Shelf;
 use inks::Curve;
 use observe::Observer;
 
@@ -27,24 +29,30 @@ impl Replacement {
     ///
     /// # Errors
     /// A document that cannot be read or has several materials, a basis that it does not have.
-    pub fn open(text: &str, space: &Space, observer: &dyn Observer) -> Result<Replacement, EditError> {
+    pub fn open(
+        shelf: &Arc<dyn Shelf>,
+        text: &str,
+        space: &Space,
+        observer: &dyn Observer,
+    ) -> Result<Replacement, EditError> {
         let name = text.chars().filter(|c| !c.is_control()).collect::<String>();
         let refused = |problem: String| EditError::Replacement { name: name.clone(), problem };
         // A name with a colon and a number may also be that of a file.
         let numbered =
             text.rsplit_once(':').and_then(|(path, basis)| Some((path, basis.parse::<usize>().ok()?)));
         let (path, basis) = match numbered {
-            Some((path, basis)) if !Path::new(text).exists() => (path, Some(basis)),
+            Some((path, basis)) if shelf.kind(Path::new(text)).is_err() => (path, Some(basis)),
             _ => (text, None),
         };
         let ending = Path::new(path).extension();
         if basis.is_none() && ending.is_some_and(|ending| ending.eq_ignore_ascii_case("csv")) {
             let path = Path::new(path);
-            let bytes = document::source::Source::new(observer).read(path, MOST_BYTES)?;
+            let bytes = document::source::Source::new(&**shelf, observer).read(path, MOST_BYTES)?;
             let curve = Curve::from_csv(&bytes[..], path).map_err(DocumentError::from)?;
             return Replacement::checked(name.clone(), foil::row(space, &curve), refused);
         }
-        let options = Options { samples: space.angles().len(), ..Options::default() };
+        let options =
+            Options { samples: space.angles().len(), shelf: Arc::clone(shelf), ..Options::default() };
         let document = document::open(path, &options, observer)?;
         let row = match (&document.content, basis) {
             (Content::Uniform(_), None) => {

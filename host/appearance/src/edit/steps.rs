@@ -27,9 +27,12 @@
 //! Files lie in the folder of the step file or below it; nothing else is read. Written steps stand by themselves: painted masks
 //! and curves lie beside them, as 16-bit pictures and CSV, and give the same document bit by bit.
 
-use std::io::{BufWriter, Write as _};
-use std::path::{Component, Path, PathBuf};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use files::FileError;
+use files::shelf::{Shelf, inside};
 use observe::Observer;
 use serde::{Deserialize, Serialize};
 
@@ -112,9 +115,14 @@ impl Steps {
     ///
     /// # Errors
     /// A file that cannot be read or is not understood, with the step; names outside its folder.
-    pub fn read(path: &Path, space: &Space, observer: &dyn Observer) -> Result<Steps, EditError> {
+    pub fn read(
+        shelf: &Arc<dyn Shelf>,
+        path: &Path,
+        space: &Space,
+        observer: &dyn Observer,
+    ) -> Result<Steps, EditError> {
         let wrong = |problem: String| EditError::Steps { path: path.to_path_buf(), problem };
-        let mut source = Source::new(observer);
+        let mut source = Source::new(&**shelf, observer);
         let text = source.read_text(path)?;
         let file: File = toml::from_str(&text).map_err(|error| {
             // The message quotes the file.
@@ -130,7 +138,7 @@ impl Steps {
         let (mut steps, mut painted) = (Vec::new(), 0);
         for (number, entry) in file.step.into_iter().enumerate() {
             let refused = |source| EditError::Step { number: number + 1, source: Box::new(source) };
-            let change = change(&entry, folder, space, observer, &wrong).map_err(refused)?;
+            let change = change(&entry, (shelf, folder), space, observer, &wrong).map_err(refused)?;
             let mask = entry.mask.map(|text| match Mask::of_maps(&text)? {
                 Some(mask) => Ok(mask),
                 None => {
@@ -175,10 +183,6 @@ impl Steps {
     /// # Errors
     /// Files that exist or cannot be written.
     pub fn write(&self, folder: &Path, space: &Space) -> Result<(), EditError> {
-        let io = |path: &Path| {
-            let path = path.to_path_buf();
-            move |source| DocumentError::Io { path, attempt: "write", source }
-        };
         let mut entries = Vec::new();
         for (number, step) in self.steps.iter().enumerate() {
             let mut entry = Entry::default();
@@ -196,10 +200,8 @@ impl Steps {
                 }
                 Change::Replace { basis, by } => {
                     let name = format!("curve-{number:02}.csv");
-                    let at = folder.join(&name);
-                    let output = BufWriter::new(std::fs::File::create_new(&at).map_err(io(&at))?);
                     let curve = space.curve(&by.row);
-                    curve.to_csv(output).map_err(|error| io(&at)(error.into()))?;
+                    files::write(&folder.join(&name), |out| Ok(curve.to_csv(out)?)).map_err(written)?;
                     (entry.basis, entry.replace) = (Some(*basis), Some(name));
                 }
                 &Change::Swap(a, b) => entry.swap = Some([a, b]),
@@ -210,7 +212,7 @@ impl Steps {
             entry.mask = match &step.mask {
                 Some(Mask::Painted(painted)) => {
                     let name = format!("mask-{number:02}.png");
-                    write_mask(painted, &folder.join(&name))?;
+                    write_mask(painted, &folder.join(&name)).map_err(written)?;
                     Some(name)
                 }
                 Some(mask) => Some(mask.to_string()),
@@ -225,36 +227,33 @@ impl Steps {
             result: self.result.clone(),
             step: entries,
         };
-        let at = folder.join(FILE_NAME);
-        let text = toml::to_string(&file).map_err(|error| io(&at)(std::io::Error::other(error)))?;
-        Ok(std::fs::write(&at, text).map_err(io(&at))?)
+        files::write_toml(&folder.join(FILE_NAME), &file).map_err(written)
     }
 }
 
-fn write_mask(painted: &Painted, at: &Path) -> Result<(), DocumentError> {
-    let io = |source| DocumentError::Io { path: at.to_path_buf(), attempt: "write", source };
-    let mut output = std::fs::File::create_new(at).map_err(io)?;
+fn written(error: FileError) -> EditError {
+    DocumentError::from(error).into()
+}
+
+fn write_mask(painted: &Painted, at: &Path) -> Result<(), FileError> {
     let greys: Vec<u8> = painted.values.iter().flat_map(|&w| to_grey(w).to_ne_bytes()).collect();
     let size = (painted.width as u32, painted.height as u32);
-    let picture = readers::png(&greys, size, readers::Pixel::Grey16).map_err(io)?;
-    output.write_all(&picture).map_err(io)
+    let picture = readers::png(&greys, size, readers::Pixel::Grey16).map_err(files::io(at, "write"))?;
+    files::write(at, |out| out.write_all(&picture))
 }
 
 /// A file in the folder or below it.
 fn beside(folder: &Path, name: &str) -> Result<PathBuf, String> {
-    let inside =
-        Path::new(name).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-    if name.is_empty() || !inside || name.contains(|c: char| c == '\\' || c.is_control()) {
-        let name: String = name.chars().filter(|c| !c.is_control()).collect();
-        return Err(format!("`{name}` must be a file in the folder of the step file, or below it"));
-    }
-    Ok(folder.join(name))
+    let shown: String = name.chars().filter(|c| !c.is_control()).collect();
+    inside(folder, name)
+        .filter(|_| shown == name)
+        .ok_or_else(|| format!("`{shown}` must be a file in the folder of the step file, or below it"))
 }
 
 /// What an entry changes: exactly one of the kinds of edits.
 fn change(
     entry: &Entry,
-    folder: &Path,
+    (shelf, folder): (&Arc<dyn Shelf>, &Path),
     space: &Space,
     observer: &dyn Observer,
     wrong: &dyn Fn(String) -> EditError,
@@ -290,7 +289,7 @@ fn change(
     }
     if let Some(text) = &entry.replace {
         let path = beside(folder, text).map_err(wrong)?;
-        let by = Replacement::open(&path.to_string_lossy(), space, observer)?;
+        let by = Replacement::open(shelf, &path.to_string_lossy(), space, observer)?;
         return Ok(Change::Replace { basis: basis()?, by });
     }
     let tint = entry.tint.as_deref().map_or(Ok(Tint::WHITE), str::parse)?;

@@ -2,7 +2,9 @@
 
 use std::fs;
 use std::path::Path;
+use std::sync::Arc;
 
+use files::shelf::{Disk, Shelf};
 use observe::Silent;
 use proptest::prelude::*;
 
@@ -134,14 +136,14 @@ proptest! {
         };
         let first = written(&edited, &kept, &home.path().join("first.foil"));
         let path = home.path().join("first.foil").join(FILE_NAME);
-        let read = Steps::read(&path, &before.space, &Silent).unwrap();
+        let read = Steps::read(&disk(), &path, &before.space, &Silent).unwrap();
         read.check(&path, &fingerprint(&before)).unwrap();
         let again = apply(&before, &read.steps).unwrap();
         prop_assert_eq!(&again.document, &edited.document);
         let second = written(&again, &read, &home.path().join("second.foil"));
         prop_assert_eq!(first, second);
         // What was written is what was edited.
-        let document = foil::read(&home.path().join("first.foil"), &Silent).unwrap();
+        let document = foil::read(&Disk, &home.path().join("first.foil"), &Silent).unwrap();
         prop_assert_eq!(fingerprint(document.as_factored().unwrap()), kept.result.unwrap());
     }
 
@@ -284,7 +286,8 @@ fn wrong_steps_are_refused_with_the_step_and_the_reason() {
     let refused = |step: &str, says: &str| {
         fs::write(&path, format!("format = 1\n[[step]]\nbasis = 0\nrougher = 1.1\n[[step]]\n{step}\n"))
             .unwrap();
-        let error = Steps::read(&path, &before.space, &Silent).and_then(|steps| apply(&before, &steps.steps));
+        let error = Steps::read(&disk(), &path, &before.space, &Silent)
+            .and_then(|steps| apply(&before, &steps.steps));
         let error = observe::with_causes(&error.expect_err(step));
         assert!(error.contains(says), "{step}: {error}");
         assert!(!error.chars().any(|c| c.is_control() && c != '\n'), "{error:?}");
@@ -334,9 +337,11 @@ fn wrong_steps_are_refused_with_the_step_and_the_reason() {
     refused("basis = 1\nreplace = \"notes.txt\"", "notes.txt");
     refused("replace = \"nan.csv\"", "nan.csv");
     fs::write(&path, "format = 2\n").unwrap();
-    assert!(Steps::read(&path, &before.space, &Silent).unwrap_err().to_string().contains("format = 2"));
+    assert!(
+        Steps::read(&disk(), &path, &before.space, &Silent).unwrap_err().to_string().contains("format = 2")
+    );
     fs::write(&path, "format = 1\n").unwrap();
-    assert!(Steps::read(&path, &before.space, &Silent).unwrap_err().to_string().contains("0 steps"));
+    assert!(Steps::read(&disk(), &path, &before.space, &Silent).unwrap_err().to_string().contains("0 steps"));
 }
 
 #[test]
@@ -351,7 +356,7 @@ fn steps_of_another_document_are_refused_by_its_name() {
     let home = tempfile::tempdir().unwrap();
     steps.write(home.path(), &one.space).unwrap();
     let path = home.path().join(FILE_NAME);
-    let read = Steps::read(&path, &one.space, &Silent).unwrap();
+    let read = Steps::read(&disk(), &path, &one.space, &Silent).unwrap();
     assert!(read.check(&path, &fingerprint(&one)).is_ok());
     let error = read.check(&path, &fingerprint(&other)).unwrap_err().to_string();
     assert!(error.contains("`leaf[2J`") && error.contains("delete the line `fingerprint`"), "{error}");
@@ -364,7 +369,7 @@ fn a_basis_can_become_a_basis_of_another_document_or_a_curve() {
     let (one, other) = (document(3, 1), document(2, 2));
     let at = |name: &str| home.path().join(name).to_string_lossy().into_owned();
     foil::write(&other, "other", None, None, Path::new(&at("other.foil"))).unwrap();
-    let open = |name: &str| Replacement::open(&at(name), &one.space, &Silent);
+    let open = |name: &str| Replacement::open(&disk(), &at(name), &one.space, &Silent);
     assert_eq!(open("other.foil:1").unwrap().row, other.bases.row(1));
     for (name, says) in
         [("other.foil", "name one of them"), ("other.foil:2", "no basis 2"), ("nowhere:0", "nowhere")]
@@ -376,4 +381,8 @@ fn a_basis_can_become_a_basis_of_another_document_or_a_curve() {
     curve.to_csv(fs::File::create(at("0.csv")).unwrap()).unwrap();
     assert_eq!(open("0.csv").unwrap().row, other.bases.row(0));
     assert!(open("0.csv:0").is_err());
+}
+
+fn disk() -> Arc<dyn Shelf> {
+    Arc::new(Disk)
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use files::shelf::Shelf;
 use observe::Observer;
 use rayon::prelude::*;
 
@@ -110,13 +111,14 @@ pub(super) const VIEWS: [&str; 2] = ["straight on", "in the reflection"];
 /// # Errors
 /// Pictures that cannot be read, have different shapes or one lightness, and stacks that cannot show both.
 pub fn open(
+    shelf: &dyn Shelf,
     pictures: &Pictures,
     colours: Option<ColourSpace>,
     printable: &Printable,
     space: &Space,
     observer: &dyn Observer,
 ) -> Result<Document, ViewsError> {
-    let mut source = Source::new(observer);
+    let mut source = Source::new(shelf, observer);
     let (name, names, [straight, highlight]) = match pictures {
         Pictures::Pair { straight, highlight } => {
             // Behind what is transparent lies paper, and no reflection.
@@ -127,11 +129,11 @@ pub fn open(
                 return Err(ViewsError::Shapes { straight, highlight, sizes: [a.size, b.size] });
             }
             let names = [straight, highlight].map(|path| file_name(path));
-            (format!("{} and {}", name_of(straight), name_of(highlight)), names, [a, b])
+            (format!("{} and {}", name_of(shelf, straight), name_of(shelf, highlight)), names, [a, b])
         }
         Pictures::Exposures(path) => {
             let pair = exposures(path, colours, &mut source)?;
-            (name_of(path), ["the long exposure", "the short exposure"].map(String::from), pair)
+            (name_of(shelf, path), ["the long exposure", "the short exposure"].map(String::from), pair)
         }
     };
     for (picture, hint) in [(&straight, ""), (&highlight, "; for a hidden mark draw it white on black")] {

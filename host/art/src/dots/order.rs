@@ -52,6 +52,7 @@ fn permutations(done: &mut Vec<Ink>, rest: &[Ink], visit: &mut impl FnMut(&[Ink]
 mod tests {
     use super::*;
     use Ink::*;
+    use files::shelf::Disk;
 
     fn order(inks: &[Ink]) -> Vec<Ink> {
         by_rules(inks, &Library::builtin())
@@ -76,7 +77,7 @@ mod tests {
         let rule = "format = 1\nbased_on = \"built-in\"\n[[rule]]\nname = \"mine\"\nsays = \"white peels under gold\"\n\
                     severity = \"error\"\ncertainty = \"measured\"\nover = \"metallic-gold\"\nunder = \"white\"\n";
         std::fs::write(folder.path().join("library.toml"), rule).unwrap();
-        let library = Library::from_dir(folder.path()).unwrap();
+        let library = Library::open(&Disk, folder.path()).unwrap();
         assert_eq!(by_rules(&[White, MetallicGold, Black], &library), [MetallicGold, White, Black]);
     }
 }

@@ -12,6 +12,7 @@ use crate::made::{Camera, Curves, DOTS_PER_MM, EYE, STACKS, V, chart, lit, stack
 use appearance::brdf::Space;
 use appearance::gamut::{self, Mapped, Printable};
 use appearance::materials::Materials;
+use files::shelf::Disk;
 use inks::{Library, Stack, ggx};
 use measure::curves::reduce::SampleOrigin;
 use measure::measure;
@@ -50,7 +51,7 @@ fn written(folder: &Path) -> Library {
         );
     }
     fs::write(folder.join("library.toml"), library).unwrap();
-    Library::from_dir(folder).unwrap()
+    Library::open(&Disk, folder).unwrap()
 }
 
 /// The light from a direction of the camera: from the can, from the card beside it, or none.
@@ -195,7 +196,7 @@ fn a_library_measured_from_a_can_prints_as_well_as_the_true_one() {
     let paper = "[[measured]]\nstack = \"substrate\"\ncurve = \"substrate.csv\"\nby = \"nobody\"\nwhen = \"2026-11\"\nsetup = \"made up\"\n";
     fs::write(mine.join("library.toml"), format!("{text}\n{paper}")).unwrap();
     fs::copy(folder.path().join("real/substrate.csv"), mine.join("substrate.csv")).unwrap();
-    let mine = Library::from_dir(&mine).unwrap();
+    let mine = Library::open(&Disk, &mine).unwrap();
 
     let target = Target { space: Space::half_angle(48) };
     let stacks = || STACKS.iter().chain(&["substrate"]).map(|s| stack(s)).collect::<Vec<_>>();

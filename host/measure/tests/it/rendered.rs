@@ -418,8 +418,8 @@ fn alum_bronze_of_the_data_set() {
         let taken = measure(&data.join("photos/alum_bronze_cylinder"), &setup, None, &Silent).unwrap();
         let mut best = f64::INFINITY;
         for kind in ["avg", "colocated"] {
-            let truth = inks::Curve::read_csv(&data.join(format!("brdf/curves_{kind}/merl_alum-bronze.csv")))
-                .unwrap();
+            let file = data.join(format!("brdf/curves_{kind}/merl_alum-bronze.csv"));
+            let truth = inks::Curve::from_csv(std::fs::File::open(&file).unwrap(), &file).unwrap();
             let mut worst = 0.0f64;
             for row in
                 taken.measurement.stacks[0].rows.iter().filter(|row| (2.0..60.0).contains(&row.theta_deg))

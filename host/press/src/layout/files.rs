@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::{Arranged, Laid};
+use files::shelf::{Disk, Shelf as _};
 use files::{FileError, read_toml, write_toml};
 use sheet::{Area, Sheet};
 
@@ -26,7 +27,7 @@ impl Arranged {
     pub fn load(folder: &Path) -> Result<Arranged, FileError> {
         let sheet = Sheet::load(folder)?;
         let path = folder.join(TEXT);
-        if !path.exists() {
+        if !Disk.is_file(&path) {
             let laid = Laid::single(Area::whole(sheet.dots()));
             return Ok(Arranged { sheet, laid });
         }

@@ -1,6 +1,5 @@
 //! Passes on disk: `passes.toml` and one PNG a pass, one bit a dot, ink shown black.
 
-use std::io::Read as _;
 use std::path::Path;
 
 use inks::Stack;
@@ -10,14 +9,16 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{Pass, Separation};
-use files::{FileError, read_toml, write_toml};
+use files::shelf::{Disk, Shelf as _};
+use files::{FileError, FolderKind, write_toml};
 use readers::exact::{Exact, SIGNATURE};
 use sheet::files::{PaperText, check_format};
 use sheet::picture::{read_png, write_png};
 use sheet::{MOST_PASSES, Plane};
 
-/// The text beside the pictures.
-pub(super) const TEXT: &str = "passes.toml";
+/// The folder, and the text beside the pictures.
+pub(super) const PASSES: FolderKind =
+    FolderKind { name: "folder of passes", text: "passes.toml", command: "separate" };
 
 /// Number of the format, raised when old files can no longer be read.
 const FORMAT: u32 = 1;
@@ -65,10 +66,9 @@ pub fn save_plane(plane: &Plane, dpi: (u16, u16), path: &Path) -> Result<(), Fil
 /// Whether this program wrote a picture, as the picture says.
 #[must_use]
 pub fn is_signed(path: &Path) -> bool {
-    let mut start = Vec::new();
-    let read = std::fs::File::open(path).and_then(|file| file.take(1 << 10).read_to_end(&mut start));
     let signature = [SIGNATURE.0, "\0", SIGNATURE.1].concat();
-    read.is_ok() && start.windows(signature.len()).any(|found| found == signature.as_bytes())
+    let signed = |start: Vec<u8>| start.windows(signature.len()).any(|found| found == signature.as_bytes());
+    Disk.start(path, 1 << 10).is_ok_and(signed)
 }
 
 /// Writes `passes.toml` and a picture of each pass, of `dpi` dots per inch across and along, into a folder that exists, the text
@@ -90,13 +90,13 @@ pub fn save(separation: &Separation, dpi: (u16, u16), folder: &Path) -> Result<(
         paper: PaperText::new(separation.paper),
         passes: separation.passes.iter().enumerate().map(pass).collect(),
     };
-    write_toml(&folder.join(TEXT), &text)
+    write_toml(&folder.join(PASSES.text), &text)
 }
 
 /// Reads what [`save`] wrote. Anything that does not fit is an error with the file and the field.
 pub fn load(folder: &Path) -> Result<Saved, FileError> {
-    let path = folder.join(TEXT);
-    let text: Text = read_toml(&path)?;
+    let path = folder.join(PASSES.text);
+    let text: Text = PASSES.read(folder)?;
     let wrong = |problem: String| FileError::Text { path: path.clone(), problem };
     check_format(text.format, FORMAT).map_err(wrong)?;
     let paper = text.paper.paper().map_err(wrong)?;

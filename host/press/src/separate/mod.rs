@@ -366,7 +366,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let separation = separate(&page(&["substrate", "C", "MS+C"]), &[], &Silent).unwrap();
         files::save(&separation, (600, 600), folder.path()).unwrap();
-        let path = folder.path().join(files::TEXT);
+        let path = folder.path().join(files::PASSES.text);
         let good = std::fs::read_to_string(&path).unwrap();
         for (from, to, words) in [
             ("format = 1", "format = 2", "format: 2"),

@@ -7,6 +7,7 @@ use appearance::document::Document;
 use appearance::factor::FactorSettings;
 use appearance::gamut::{GamutSettings, Printable};
 use appearance::views::{self, Pictures, ViewsError};
+use files::shelf::Disk;
 use inks::{InkSet, Library};
 use observe::Silent;
 use press::layout::Layout;
@@ -47,7 +48,7 @@ fn document(a: Drawing, b: Drawing, b_sides: (usize, usize), inks: &str) -> Resu
     let [straight, highlight] = paths;
     let space = Space::half_angle(32);
     let printable = Printable::combined(&Library::builtin(), &inks.parse().unwrap(), &space);
-    views::open(&Pictures::Pair { straight, highlight }, None, &printable, &space, &Silent)
+    views::open(&Disk, &Pictures::Pair { straight, highlight }, None, &printable, &space, &Silent)
 }
 
 fn printed(document: &Document, inks: &str) -> Halftoned {

@@ -11,6 +11,7 @@ use appearance::brdf::Space;
 use appearance::gamut::Printable;
 use appearance::views::{self, Pictures};
 use clap::Args;
+use files::shelf::Disk;
 use inks::{InkSet, InkSetError, Library, Trust};
 use make::choice::{Metric, name};
 use make::print::SEED;
@@ -111,7 +112,8 @@ impl DocumentArgs {
             let (inks, library) = at_hand()?;
             let space = Space::half_angle(self.samples);
             let printable = Printable::combined(&library, &inks, &space);
-            let mut document = views::open(&pictures, self.colour_space, &printable, &space, observer)?;
+            let mut document =
+                views::open(&Disk, &pictures, self.colour_space, &printable, &space, observer)?;
             document.name.retain(|c| !c.is_control());
             return Ok(document);
         }
@@ -119,6 +121,7 @@ impl DocumentArgs {
             material: self.material.clone(),
             colour_space: self.colour_space,
             samples: self.samples,
+            ..document::Options::default()
         };
         let mut document = match document::open(&self.document, &options, observer) {
             Ok(document) => document,

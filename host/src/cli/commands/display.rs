@@ -8,6 +8,7 @@ use appearance::brdf::Space;
 use appearance::document::{Document, SAMPLES, name_of, same_shape};
 use appearance::materials::{Materials, Reduced, resolution};
 use clap::Args as ClapArgs;
+use files::shelf::Disk;
 use inks::{InkSet, Library, Stack};
 use make::Made;
 use press::layout::{Layout, Mm, Point};
@@ -188,7 +189,7 @@ fn size(materials: &dyn Materials) -> (usize, usize) {
 
 /// An image's name without its folders, as it stands on the page.
 fn shown_name(name: &str) -> String {
-    name_of(Path::new(name))
+    name_of(&Disk, Path::new(name))
 }
 
 impl Args {

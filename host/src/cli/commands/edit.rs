@@ -6,6 +6,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::Arc;
 
 use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
@@ -20,6 +21,7 @@ use appearance::edit::{
 };
 use appearance::gamut::Printable;
 use appearance::materials::{Factored, Nearest};
+use files::shelf::{Disk, Shelf};
 use observe::Observer;
 use press::pipeline::document as stages;
 
@@ -198,7 +200,7 @@ impl Args {
     fn staged(&self) -> Result<(Staged, PathBuf)> {
         let document = self.document.path();
         let target = self.output.clone().unwrap_or_else(|| {
-            let name = name_of(document);
+            let name = name_of(&Disk, document);
             let name = name.strip_prefix("sample:").unwrap_or(&name);
             format!("{}-edited.foil", output::file_name(name)).into()
         });
@@ -228,7 +230,7 @@ impl Args {
         };
         let path = self.document.path().join(FILE_NAME);
         let Some(factored) = edited.filter(|_| path.is_file()) else { return Ok(fresh) };
-        let earlier = Steps::read(&path, &factored.space, observer).context(
+        let earlier = Steps::read(&disk(), &path, &factored.space, observer).context(
             "the earlier steps of the document cannot be kept; delete them to edit it as a new document",
         )?;
         if earlier.result.as_deref() == Some(fingerprint) {
@@ -244,12 +246,12 @@ impl Args {
     /// The steps of this command.
     fn added(&self, space: &Space, fingerprint: &str, observer: &dyn Observer) -> Result<Vec<Step>> {
         if let Some(path) = &self.steps {
-            let read = Steps::read(path, space, observer)?;
+            let read = Steps::read(&disk(), path, space, observer)?;
             read.check(path, fingerprint)?;
             return Ok(read.steps);
         }
         let change = if let Some(Replacing(basis, document)) = &self.replace {
-            Change::Replace { basis: *basis, by: Replacement::open(document, space, observer)? }
+            Change::Replace { basis: *basis, by: Replacement::open(&disk(), document, space, observer)? }
         } else if let Some(Two(a, b)) = self.swap {
             Change::Swap(a, b)
         } else if let Some(Mixing(Two(basis, into), share)) = self.mix {
@@ -268,7 +270,7 @@ impl Args {
         } else {
             return Ok(Vec::new());
         };
-        let mask = self.mask.as_deref().map(|text| Mask::open(text, observer)).transpose()?;
+        let mask = self.mask.as_deref().map(|text| Mask::open(&Disk, text, observer)).transpose()?;
         Ok(vec![Step { change, mask }])
     }
 }
@@ -442,4 +444,8 @@ fn surface_in_words(surface: &Surface, effect: &Effect) -> String {
         }
     }
     parts.join(", ")
+}
+
+fn disk() -> Arc<dyn Shelf> {
+    Arc::new(Disk)
 }

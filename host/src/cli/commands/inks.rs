@@ -15,6 +15,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use files::shelf::Disk;
 use inks::{Entry, InkSet, Library, Origins, Provenance, Severity, Source, Stack, own};
 use protocol::ink::Ink;
 use serde::Serialize;
@@ -407,12 +408,12 @@ fn layer_lines(library: &Library, ink: Ink, place: &str) -> Vec<String> {
 }
 
 fn check(dir: &Path, json: bool) -> anyhow::Result<(String, anyhow::Result<()>)> {
-    let problems = Library::check(dir);
+    let problems = Library::check(&Disk, dir);
     let mut text: String =
         problems.iter().map(|problem| problem.to_string().replace('\n', "\n    ") + "\n").collect();
     let count = |severity| problems.iter().filter(|problem| problem.severity == severity).count();
     let (errors, warnings, notes) = (count(Severity::Error), count(Severity::Warning), count(Severity::Note));
-    if let Ok(library) = Library::from_dir(dir) {
+    if let Ok(library) = Library::open(&Disk, dir) {
         text.push_str(&format!("{}: {}\n", dir.display(), library.origins()));
     }
     let counted = |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
+use files::shelf::Disk;
 use inks::Library;
 
 use crate::cli::console::{print_job, show};
@@ -93,7 +94,7 @@ fn curves(photos: &Path, setup: &Path, output: &Path, observer: &dyn Observer) -
     let taken = measure::measure(photos, &setup, sheet.as_ref().map(Sheet::dots), observer)?;
     let folder = staged.create()?;
     measure::curves::library::write(&taken, folder)?;
-    Library::from_dir(folder).context("the measured curves cannot be used as an ink library")?;
+    Library::open(&Disk, folder).context("the measured curves cannot be used as an ink library")?;
     staged.commit()?;
     show(&summary(&taken.measurement, output))
 }

@@ -19,6 +19,7 @@ use appearance::edit::fingerprint;
 use appearance::factor::Factored;
 use appearance::gamut::files::Provenance;
 use appearance::gamut::{self, GamutError, Printable};
+use files::shelf::Disk;
 use halftone::metrics;
 use observe::Observer;
 use press::layout;
@@ -33,7 +34,7 @@ use sheet::Size;
 fn named(output: &Option<PathBuf>, from: &Path, ending: &str) -> PathBuf {
     output
         .clone()
-        .unwrap_or_else(|| format!("{}.{ending}", output::file_name(&document::name_of(from))).into())
+        .unwrap_or_else(|| format!("{}.{ending}", output::file_name(&document::name_of(&Disk, from))).into())
 }
 
 /// Arguments of `factor`.
@@ -100,7 +101,7 @@ impl Map {
     /// Bases → mixtures of stacks.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
         let (set, library) = self.inks.at_hand()?;
-        let read = foil::read(&self.factored, observer)?;
+        let read = foil::read(&Disk, &self.factored, observer)?;
         let (factored, _) = stages::factored(&read, &Default::default(), observer)?;
         let document = self
             .document
@@ -111,6 +112,7 @@ impl Map {
                     material: self.material.clone(),
                     colour_space: self.colour_space,
                     samples,
+                    ..document::Options::default()
                 };
                 document::open(spec, &options, observer)
             })
@@ -137,7 +139,7 @@ impl Map {
     /// With a document its pixels are mapped, and only their bases come from what was factored: so it must be the one that was factored,
     /// and nothing may have been changed since.
     fn check_origin(&self, document: &Document, factored: &Factored, observer: &dyn Observer) -> Result<()> {
-        let problem = match foil::origin(&self.factored, observer)? {
+        let problem = match foil::origin(&Disk, &self.factored, observer)? {
             None => "it was edited, or made by hand",
             Some(origin) if origin.document != document.digest => "it was factored from another document",
             Some(origin) if origin.result != fingerprint(factored) => {

@@ -105,7 +105,6 @@ mod tests {
     use device::transit::journal::JournalError;
     use device::transit::raw::RawError;
     use files::FileError;
-    use inks::CurveError;
     use press::inspect::StreamError;
     use press::pipeline::JobError;
     use press::pipeline::document::StageError;
@@ -157,13 +156,17 @@ mod tests {
         let carousel = || CarouselError::TooMany(9);
         let fire = || "the disk is on fire".to_owned();
         vec![
-            (Box::new(CurveError::Io { path: path(), source: disk() }), fire()),
-            (Box::new(DocumentError::Io { path: path(), attempt: "open it", source: disk() }), fire()),
+            (
+                Box::new(DocumentError::File(FileError::Io {
+                    path: path(),
+                    attempt: "open",
+                    source: disk(),
+                })),
+                fire(),
+            ),
             (Box::new(DocumentError::Weights { path: path(), source: weights() }), weights().to_string()),
-            (Box::new(DocumentError::Curve(CurveError::Io { path: path(), source: disk() })), fire()),
             (Box::new(FactorError::Weights(weights())), weights().to_string()),
             (Box::new(mixture()), MixtureError::NoStacks.to_string()),
-            (Box::new(MixFileError::Io { path: path(), source: disk() }), fire()),
             (Box::new(MixFileError::Weights { path: path(), source: weights() }), weights().to_string()),
             (
                 Box::new(MixFileError::Mix { path: path(), source: MixError::Rows { rows: 2, channels: 3 } }),

@@ -21,7 +21,7 @@ pub struct Truth {
 
 impl Truth {
     pub fn new(sheet: &Sheet, shot: &Shot, picture: &Picture, tile: &Path) -> Truth {
-        let options = document::Options { material: None, colour_space: None, samples: document::SAMPLES };
+        let options = document::Options::default();
         let document = document::open(tile.to_str().unwrap(), &options, &Silent).unwrap();
         let materials = document.materials();
         let space = materials.space();

@@ -1,11 +1,13 @@
 //! The page in a real browser against the renderer, and every control of it.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use appearance::brdf::{Space, Table, reflectances};
 use appearance::edit::{Steps, apply, fingerprint};
 use appearance::factor::Factored;
 use appearance::weights::{ONE, WeightMaps};
+use files::shelf::{Disk, Shelf};
 use image::RgbImage;
 use inks::{Curve, Library, Stack};
 use observe::Silent;
@@ -294,7 +296,7 @@ fn the_page_draws_what_the_renderer_draws_in_a_browser() {
     for (i, &(edit, light, stops, surrounded)) in edits.iter().enumerate() {
         let i = states.len() + 1 + i;
         let path = folder.path().join(format!("{i}.toml"));
-        let steps = Steps::read(&path, &made.space, &Silent).unwrap();
+        let steps = Steps::read(&(Arc::new(Disk) as Arc<dyn Shelf>), &path, &made.space, &Silent).unwrap();
         steps.check(&path, &fingerprint(&made.document)).unwrap();
         let replayed = apply(&made.document, &steps.steps).unwrap().document;
         let drawn = |document: &Factored| {

@@ -2,7 +2,9 @@
 
 use std::io::{Cursor, Write as _};
 use std::path::Path;
+use std::sync::Arc;
 
+use files::shelf::Memory;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
@@ -139,4 +141,44 @@ fn what_comes_out_is_limited_whatever_the_header_says() {
     std::fs::write(&path, zipped(&files)).unwrap();
     let said = opened(&path).unwrap_err();
     assert!(said.contains("material.toml") && said.contains("the limit is 1048576"), "{said}");
+}
+
+#[test]
+fn documents_in_memory_are_those_on_disk_and_say_what_they_lack() {
+    let outer = tempfile::tempdir().unwrap();
+    let mut memory = Memory::default();
+    let mut put = |name: &str, bytes: &[u8]| {
+        let path = outer.path().join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, bytes).unwrap();
+        memory.insert(path, bytes).unwrap();
+    };
+    maps("metal.v2/").iter().for_each(|(name, bytes)| put(name, bytes));
+    put("metal.zip", &zipped(&maps("textures/")));
+    let scene = |uri: &str| {
+        format!(
+            r#"{{"asset":{{"version":"2.0"}},"images":[{{"uri":"{uri}"}}],"textures":[{{"source":0}}],"materials":[{{"name":"a",
+            "pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}]}}"#
+        )
+    };
+    put("whole.gltf", scene("metal.v2/Metal032_1K_Color.png").as_bytes());
+    put("rust.gltf", scene("rust.png").as_bytes());
+    put("out.gltf", scene("../rust.png").as_bytes());
+    let spec = |name: &str| outer.path().join(name).to_str().unwrap().to_owned();
+    let names = ["metal.v2", "metal.zip", "whole.gltf"];
+    let on_disk = names.map(|name| opened(Path::new(&spec(name))).unwrap());
+    let options = Options { shelf: Arc::new(memory), ..Options::default() };
+    let specs = names.map(spec);
+    let wanting = ["rust.gltf", "out.gltf"].map(spec);
+    // What is in memory alone needs no disk.
+    drop(outer);
+    for (disk, spec) in on_disk.iter().zip(&specs) {
+        let found = open(spec, &options, &Silent).unwrap();
+        assert_eq!((&found.name, &found.digest), (&disk.name, &disk.digest));
+        assert_eq!((&found.notes, row(&found)), (&disk.notes, row(disk)));
+    }
+    assert_eq!((&*on_disk[0].name, &*on_disk[1].name), ("metal.v2", "metal"));
+    let errors = wanting.map(|spec| observe::with_causes(&open(&spec, &options, &Silent).unwrap_err()));
+    assert!(errors[0].contains("rust.png: cannot open: "), "{}", errors[0]);
+    assert!(errors[1].contains("`../rust.png` must be a file in the document's folder"), "{}", errors[1]);
 }

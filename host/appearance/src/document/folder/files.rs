@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use ::files::shelf::Kind;
+
 use super::settings::{FolderSettings, SETTINGS};
 use crate::document::error::{DocumentError, list};
 use crate::document::names::{self, Role, stem};
@@ -21,8 +23,8 @@ impl Files {
         source: &mut Source<'_>,
     ) -> Result<Files, DocumentError> {
         let (mut seen, mut foreign) = (Vec::new(), Vec::new());
-        for (name, is_folder) in source.list(folder)? {
-            if name.starts_with('.') || is_folder {
+        for (name, kind) in source.list(folder)? {
+            if name.starts_with('.') || kind == Kind::Folder {
                 continue;
             }
             if is_picture(&name) {

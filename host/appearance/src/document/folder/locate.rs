@@ -7,6 +7,8 @@
 
 use std::path::{Path, PathBuf};
 
+use ::files::shelf::Kind;
+
 use super::files::has_base_colour;
 use super::settings::SETTINGS;
 use crate::document::error::{DocumentError, list};
@@ -33,7 +35,8 @@ pub fn locate(folder: &Path, source: &mut Source<'_>) -> Result<Found, DocumentE
         let (mut found, mut next) = (Vec::new(), Vec::new());
         for path in level.iter().take(MOST_FOLDERS) {
             let entries = source.list(path)?;
-            let files = || entries.iter().filter(|(_, is_folder)| !is_folder).map(|(name, _)| &name[..]);
+            let files =
+                || entries.iter().filter(|(_, kind)| *kind != Kind::Folder).map(|(name, _)| &name[..]);
             let scenes: Vec<&str> = files().filter(|name| is_scene(name)).collect();
             if has_base_colour(files()) || files().any(|name| name == SETTINGS) {
                 found.push(Found::Maps(path.clone()));
@@ -44,7 +47,7 @@ pub fn locate(folder: &Path, source: &mut Source<'_>) -> Result<Found, DocumentE
             next.extend(
                 entries
                     .iter()
-                    .filter(|(name, is_folder)| *is_folder && visible(name))
+                    .filter(|(name, kind)| *kind == Kind::Folder && visible(name))
                     .map(|e| path.join(&e.0)),
             );
         }

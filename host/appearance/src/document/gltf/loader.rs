@@ -5,13 +5,14 @@
 use std::path::{Path, PathBuf};
 
 use base64::Engine;
+use files::shelf::inside;
 use percent_encoding::percent_decode_str;
 
 use super::root::{Info, Root};
 use crate::document::content::ColourSpace;
 use crate::document::error::DocumentError;
 use crate::document::picture::Picture;
-use crate::document::source::{MOST_BYTES, Source, is_within};
+use crate::document::source::{MOST_BYTES, Source};
 use crate::document::texture::Field;
 
 /// The placement of a map on the surface: offset, rotation, scale, set of coordinates.
@@ -188,11 +189,10 @@ impl<'a> Loader<'a, '_> {
             return Ok((PathBuf::from(format!("{} {label}", self.path.display())), bytes));
         }
         let file = percent_decode_str(uri).decode_utf8_lossy();
-        if !is_within(&file) {
+        let Some(path) = inside(self.path.parent().unwrap_or(Path::new("")), &file) else {
             return Err(self
                 .wrong(field, format!("{label}: `{uri}` must be a file in the document's folder or below")));
-        }
-        let path = self.path.parent().unwrap_or(Path::new("")).join(&*file);
+        };
         let bytes = self.source.read(&path, MOST_BYTES)?;
         Ok((path, bytes))
     }

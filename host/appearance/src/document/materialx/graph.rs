@@ -7,11 +7,11 @@
 
 use std::path::{Path, PathBuf};
 
+use files::shelf::inside;
 use roxmltree::Node;
 
 use crate::document::error::DocumentError;
 use crate::document::picture::Encoding;
-use crate::document::source::is_within;
 
 /// The most nodes of the document's tree.
 pub(super) const MOST_NODES: u32 = 200_000;
@@ -218,11 +218,11 @@ impl<'d> Graph<'d, '_> {
         if name.contains(['<', '{']) {
             return Err(self.wrong(place, format!("`{name}` stands for several files; name one of them")));
         }
-        if !is_within(&name) {
+        let Some(path) = inside(self.path.parent().unwrap_or(Path::new("")), &name) else {
             return Err(
                 self.wrong(place, format!("`{name}` must be a file in the document's folder or below"))
             );
-        }
+        };
         let moved = ["uvtiling", "uvoffset", "realworldimagesize", "scale", "rotation"].iter().any(|&name| {
             let value = input(node, name).and_then(|input| numbers(input.attribute("value")?));
             let still = if name.contains("tiling") || name == "scale" { 1.0 } else { 0.0 };
@@ -233,8 +233,7 @@ impl<'d> Graph<'d, '_> {
         });
         let stated = input(node, "sourceColorSpace").and_then(|input| input.attribute("value"));
         let encoding = self.encoding(&file, stated);
-        let file = self.path.parent().unwrap_or(Path::new("")).join(name);
-        Ok(Image { file, encoding, channel: None, factor: [1.0; 3], note })
+        Ok(Image { file: path, encoding, channel: None, factor: [1.0; 3], note })
     }
 
     /// The colour space that holds for a value: its own, or that of the nearest element around it.

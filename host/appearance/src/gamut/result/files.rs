@@ -5,10 +5,12 @@
 //! strict: wrong sizes, wrong sums and unknown keys are errors that name the file and the field. Each file is written under
 //! a temporary name and renamed; a caller that needs the whole folder to appear at once must rename it too.
 
-use std::fs::File;
-use std::io::{BufReader, BufWriter, Read, Write};
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
+use files::durable::{self, Access};
+use files::shelf::{Disk, Shelf as _};
+use files::{FileError, FolderKind};
 use inks::Stack;
 use rayon::prelude::*;
 use readers::exact::{self, Exact, Inexact};
@@ -18,12 +20,10 @@ use super::mix::{InkMix, MixError};
 use crate::weights::grey::{from_greys, to_grey};
 use crate::weights::{ONE, WeightError, WeightMaps};
 
-/// The name of the description in the folder.
-const FILE_NAME: &str = "mix.toml";
+/// The folder.
+const MIX: FolderKind = FolderKind { name: "mapped document", text: "mix.toml", command: "map" };
 /// The format that the description declares.
 const FORMAT: &str = "foilpress-mix-1";
-/// The largest `mix.toml` read, in bytes.
-const LONGEST: u64 = 4 << 20;
 /// The most pixels times maps read: a gigabyte of weights, 30 maps of 4096 x 4096.
 const MOST_WEIGHTS: usize = 1 << 29;
 
@@ -31,13 +31,8 @@ const MOST_WEIGHTS: usize = 1 << 29;
 #[derive(Debug, thiserror::Error)]
 pub enum MixFileError {
     /// Reading or writing failed.
-    #[error("{}: cannot be read or written", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The error of the system.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// The description is invalid.
     #[error("{}: {problem}", path.display())]
     Description {
@@ -110,10 +105,9 @@ struct Description {
 
 /// Writes a mix to a folder, which is created if it does not exist.
 pub fn save(mix: &InkMix, provenance: &Provenance, folder: &Path) -> Result<(), MixFileError> {
-    let described = folder.join(FILE_NAME);
+    let described = folder.join(MIX.text);
     mix.check().map_err(|source| MixFileError::Mix { path: described.clone(), source })?;
-    std::fs::create_dir_all(folder)
-        .map_err(|source| MixFileError::Io { path: folder.to_path_buf(), source })?;
+    durable::make_folder(folder, Access::Everyone).map_err(files::io(folder, "write"))?;
     let maps = &mix.maps;
     (0..maps.channels()).into_par_iter().try_for_each(|channel| {
         let mut bytes = Vec::with_capacity(maps.width() * maps.height() * 2);
@@ -122,7 +116,7 @@ pub fn save(mix: &InkMix, provenance: &Provenance, folder: &Path) -> Result<(), 
         }
         let path = folder.join(map_name(channel));
         let size = (maps.width(), maps.height());
-        whole(&path, |file| exact::write(file, size, None, Exact::Deep, &bytes))
+        files::write(&path, |file| exact::write(file, size, None, Exact::Deep, &bytes))
     })?;
     let description = Description {
         format: FORMAT.into(),
@@ -133,40 +127,15 @@ pub fn save(mix: &InkMix, provenance: &Provenance, folder: &Path) -> Result<(), 
         matrix: mix.matrix.clone(),
         provenance: provenance.clone(),
     };
-    let text = toml::to_string(&description)
-        .map_err(|e| MixFileError::Description { path: described.clone(), problem: e.to_string() })?;
     // Last, because a folder without a description is not a mix.
-    whole(&described, |file| file.write_all(text.as_bytes()))
-}
-
-/// Writes a file under a temporary name in the same folder and renames it.
-fn whole(
-    path: &Path,
-    write: impl FnOnce(&mut BufWriter<&File>) -> std::io::Result<()>,
-) -> Result<(), MixFileError> {
-    let io = |source| MixFileError::Io { path: path.to_path_buf(), source };
-    let file = tempfile::Builder::new()
-        .prefix(".")
-        .tempfile_in(path.parent().unwrap_or(Path::new(".")))
-        .map_err(io)?;
-    let mut buffered = BufWriter::new(file.as_file());
-    write(&mut buffered).and_then(|()| buffered.flush()).map_err(io)?;
-    drop(buffered);
-    file.persist(path).map_err(|e| io(e.error))?;
-    Ok(())
+    Ok(files::write_toml(&described, &description)?)
 }
 
 /// Reads a mix and its origin.
 pub fn load(folder: &Path) -> Result<(InkMix, Provenance), MixFileError> {
-    let path = folder.join(FILE_NAME);
+    let path = folder.join(MIX.text);
     let wrong = |problem: String| MixFileError::Description { path: path.clone(), problem };
-    let io = |source| MixFileError::Io { path: path.clone(), source };
-    let mut text = String::new();
-    File::open(&path).map_err(io)?.take(LONGEST + 1).read_to_string(&mut text).map_err(io)?;
-    if text.len() as u64 > LONGEST {
-        return Err(wrong(format!("the file is longer than {LONGEST} bytes")));
-    }
-    let described: Description = toml::from_str(&text).map_err(|e| wrong(e.to_string()))?;
+    let described: Description = MIX.read(folder)?;
     let Description { format, width, height, one, stacks, matrix, provenance } = described;
     if format != FORMAT {
         return Err(wrong(format!("`format` is `{format}`, expected `{FORMAT}`")));
@@ -211,7 +180,7 @@ pub fn load(folder: &Path) -> Result<(InkMix, Provenance), MixFileError> {
 
 fn read_map(path: &Path, width: usize, height: usize) -> Result<Vec<u8>, MixFileError> {
     let wrong = |problem: String| MixFileError::Map { path: path.to_path_buf(), problem, width, height };
-    let file = File::open(path).map_err(|source| MixFileError::Io { path: path.to_path_buf(), source })?;
+    let file = Disk.open(path).map_err(files::io(path, "open"))?;
     exact::read(BufReader::new(file), (width, height), Exact::Deep).map_err(|error| match error {
         Inexact::Damaged(said) => wrong(said.to_string()),
         Inexact::Other { found, .. } => wrong(format!("it has {found}")),
@@ -241,7 +210,7 @@ mod tests {
 
     fn edited(from: &str, to: &str) -> String {
         let folder = saved();
-        let path = folder.path().join(FILE_NAME);
+        let path = folder.path().join(MIX.text);
         let text = std::fs::read_to_string(&path).unwrap();
         assert!(text.contains(from), "{text}");
         std::fs::write(&path, text.replace(from, to)).unwrap();
@@ -294,14 +263,14 @@ mod tests {
         let error = load(folder.path()).unwrap_err();
         assert!(observe::with_causes(&error).contains("pixel (0, 0)"), "{error}");
         std::fs::remove_file(&path).unwrap();
-        assert!(matches!(load(folder.path()), Err(MixFileError::Io { .. })));
+        assert!(matches!(load(folder.path()), Err(MixFileError::File(FileError::Io { .. }))));
     }
 
     /// Painted greys of which no weight is a whole number, though they sum to white: as they are read in a `.foil` folder.
     #[test]
     fn greys_that_sum_to_white_are_weights() {
         let folder = saved();
-        let path = folder.path().join(FILE_NAME);
+        let path = folder.path().join(MIX.text);
         let text = std::fs::read_to_string(&path).unwrap();
         let at = text.find("matrix").unwrap();
         let end = at + text[at..].find("\n[").unwrap_or(text.len() - at);
@@ -311,7 +280,7 @@ mod tests {
             .unwrap();
         let paint = |greys: [u16; 3]| {
             for (channel, grey) in greys.into_iter().enumerate() {
-                let file = File::create(folder.path().join(map_name(channel))).unwrap();
+                let file = std::fs::File::create(folder.path().join(map_name(channel))).unwrap();
                 let mut encoder = png::Encoder::new(file, 1, 1);
                 encoder.set_color(png::ColorType::Grayscale);
                 encoder.set_depth(png::BitDepth::Sixteen);
@@ -329,7 +298,7 @@ mod tests {
     #[test]
     fn eight_bits_are_refused() {
         let folder = saved();
-        let file = File::create(folder.path().join("weights-000.png")).unwrap();
+        let file = std::fs::File::create(folder.path().join("weights-000.png")).unwrap();
         let mut encoder = png::Encoder::new(file, 3, 2);
         encoder.set_color(png::ColorType::Grayscale);
         encoder.write_header().unwrap().write_image_data(&[0; 6]).unwrap();

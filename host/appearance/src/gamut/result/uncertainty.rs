@@ -126,6 +126,7 @@ mod tests {
     use super::*;
     use crate::gamut::{GamutSettings, Printable, clamped};
     use crate::materials::Surface;
+    use files::shelf::Disk;
     use inks::Stack;
     use observe::Silent;
     use rand::{Rng, RngExt, SeedableRng};
@@ -154,7 +155,7 @@ mod tests {
             );
         }
         std::fs::write(folder.path().join("library.toml"), text).unwrap();
-        Library::from_dir(folder.path()).unwrap()
+        Library::open(&Disk, folder.path()).unwrap()
     }
 
     /// 8 x 8 materials from dark to light and from dull to glossy, some of them beyond what the stacks reach.

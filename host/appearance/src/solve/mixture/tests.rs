@@ -31,7 +31,12 @@ fn measured(space: &Space) -> Option<Vec<(String, Vec<f64>)>> {
     let mut files: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()).collect();
     files.sort();
     let name = |p: &PathBuf| p.file_stem().unwrap().to_string_lossy().into_owned();
-    Some(files.iter().map(|p| (name(p), space.row(&Curve::read_csv(p).unwrap()))).collect())
+    Some(
+        files
+            .iter()
+            .map(|p| (name(p), space.row(&Curve::from_csv(std::fs::File::open(p).unwrap(), p).unwrap())))
+            .collect(),
+    )
 }
 
 /// A second minimiser that shares nothing with ours: multiplicative updates `a_k <- a_k exp(-eta slope_k)` with

@@ -1,11 +1,11 @@
 //! `foilpress inks from`: a curve from an instrument other than a camera, into a library.
 
 use std::fmt::Write as _;
-use std::fs;
 use std::path::PathBuf;
 
-use anyhow::{Context, Result, bail};
+use anyhow::Result;
 use appearance::document;
+use files::shelf::{Disk, Shelf as _};
 use inks::{Curve, Stack, archive};
 use measure::curves::library::{curve_name, quoted};
 use measure::curves::readings;
@@ -102,13 +102,10 @@ fn read(args: &Args, observer: &dyn Observer) -> Result<Taken> {
             setup: format!("from {named}: {}", from.words),
         });
     }
-    let curve = document::measured(path, observer)?;
+    let curve = document::measured(&Disk, path, observer)?;
     let csv = if ending == "csv" {
         // The file itself, with its standard deviations.
-        if fs::metadata(path)?.len() > MOST_BYTES {
-            bail!("{}: longer than {} MB", path.display(), MOST_BYTES >> 20);
-        }
-        fs::read(path).with_context(|| format!("cannot read {}", path.display()))?
+        Disk.read(path, MOST_BYTES)?
     } else {
         text_of(&curve)?
     };

@@ -5,6 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
+use files::shelf::Disk;
 use inks::{FILE_NAME, Library, Stack, archive};
 
 use crate::cli::output::{Kind, Staged};
@@ -51,7 +52,7 @@ fn present(folder: &Path) -> Result<Option<Library>> {
     if !folder.exists() {
         return Ok(None);
     }
-    let here = Library::from_dir(folder)
+    let here = Library::open(&Disk, folder)
         .with_context(|| format!("{} is not a usable ink library", folder.display()))?;
     Ok(Some(here))
 }
@@ -62,7 +63,7 @@ fn add(folder: &Path, tables: &str, added: Option<archive::Member>, unusable: &s
         let text = "format = 1\nbased_on = \"built-in\"\nname = \"measured stacks\"\n";
         vec![archive::Member { name: FILE_NAME.into(), bytes: text.into() }]
     } else {
-        archive::gather(folder).with_context(|| format!("{}", folder.display()))?
+        archive::gather(&Disk, folder).with_context(|| format!("{}", folder.display()))?
     };
     let index =
         members.iter().position(|member| member.name == FILE_NAME).context("a library has library.toml")?;
@@ -71,7 +72,7 @@ fn add(folder: &Path, tables: &str, added: Option<archive::Member>, unusable: &s
     members.extend(added.clone());
     let checked = tempfile::tempdir().context("cannot make a temporary folder")?;
     archive::place(&members, checked.path())?;
-    let library = Library::from_dir(checked.path()).map_err(|error| {
+    let library = Library::open(&Disk, checked.path()).map_err(|error| {
         // The temporary folder means nothing to the user.
         let inside = format!("{}{}", checked.path().display(), std::path::MAIN_SEPARATOR);
         anyhow::anyhow!("{unusable}: {}", error.to_string().replace(&inside, ""))

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use appearance::brdf::{Space, compare};
+use files::shelf::Disk;
 use inks::predict::{FittedFigure, LeftOut, Predicted, Prediction};
 use inks::{Curve, FILE_NAME, Library, Provenance, Stack, archive};
 use measure::curves::library::{curve_name, quoted};
@@ -80,8 +81,8 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<String> {
     };
     let members = members(&folder, &library, &found, &report)?;
     archive::place(&members, staged.create()?)?;
-    let full =
-        Library::from_dir(staged.path()).context("the predicted curves cannot be used as an ink library")?;
+    let full = Library::open(&Disk, staged.path())
+        .context("the predicted curves cannot be used as an ink library")?;
     staged.commit()?;
     if args.json {
         return Ok(serde_json::to_string_pretty(&report)? + "\n");
@@ -105,7 +106,7 @@ fn members(
     found: &Prediction,
     report: &Report<'_>,
 ) -> Result<Vec<archive::Member>> {
-    let mut members = archive::gather(folder).with_context(|| format!("{}", folder.display()))?;
+    let mut members = archive::gather(&Disk, folder).with_context(|| format!("{}", folder.display()))?;
     members.retain(|member| member.name != archive::PREDICTION);
     let (mut people, mut when) = (Vec::new(), "");
     for entry in library.entries() {

@@ -5,6 +5,7 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use files::shelf::Disk;
 use inks::own::{self, Own};
 use inks::{Library, archive};
 use protocol::ink::Ink;
@@ -35,8 +36,8 @@ fn installed(name: &str, members: &[archive::Member], from: &Path) -> Result<Str
 
 /// Makes the library in a folder one of the user's own.
 pub fn add(dir: &Path, name: Option<String>) -> Result<String> {
-    Library::from_dir(dir).with_context(|| format!("{} is not a usable ink library", dir.display()))?;
-    let members = archive::gather(dir).with_context(|| format!("{}", dir.display()))?;
+    Library::open(&Disk, dir).with_context(|| format!("{} is not a usable ink library", dir.display()))?;
+    let members = archive::gather(&Disk, dir).with_context(|| format!("{}", dir.display()))?;
     installed(&suggested(dir, name), &members, dir)
 }
 
@@ -75,7 +76,7 @@ pub fn export(spec: &Path, output: Option<&Path>, licence: Option<&str>) -> Resu
         Path::to_path_buf,
     );
     let staged = Staged::file(&output)?;
-    let members = archive::gather(&folder).with_context(|| format!("{}", folder.display()))?;
+    let members = archive::gather(&Disk, &folder).with_context(|| format!("{}", folder.display()))?;
     let bytes =
         archive::pack(&members, &library, licence).with_context(|| format!("{}", folder.display()))?;
     std::fs::write(staged.path(), &bytes).with_context(|| format!("cannot write {}", output.display()))?;

@@ -7,6 +7,7 @@ use anyhow::Result;
 use appearance::brdf::Space;
 use appearance::document::{SAMPLES, name_of};
 use appearance::factor::{Factored, Method};
+use files::shelf::Disk;
 use inks::Library;
 use make::choice;
 use make::print::{Print, SEED};
@@ -144,7 +145,7 @@ pub fn printed(path: &Path, observer: &dyn Observer) -> Result<Option<DotMap>> {
 pub fn printed_name(path: &Path) -> String {
     let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let folder = whole.parent().filter(|folder| folder.join("plan.html").is_file());
-    name_of(folder.filter(|_| whole.ends_with("job.rgl")).unwrap_or(&whole))
+    name_of(&Disk, folder.filter(|_| whole.ends_with("job.rgl")).unwrap_or(&whole))
 }
 
 #[cfg(test)]
