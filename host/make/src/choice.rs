@@ -1,9 +1,9 @@
-//! Names and words of what can be chosen: for the options of a command line, for reports, and for dialogs.
+//! Names and words of what can be chosen beside the options of a [page](crate::options): for a command line and for reports.
 
 use appearance::document::ColourSpace;
 use appearance::factor::Method;
 use appearance::gamut::{self, Intent};
-use art::{Accept, Finish, White};
+use art::Accept;
 use inks::Trust;
 
 use crate::view::Show;
@@ -104,63 +104,10 @@ impl Choice for Intent {
     ];
 }
 
-impl Choice for halftone::Method {
-    const ALL: &'static [(halftone::Method, &'static str, &'static str)] = &[
-        (halftone::Method::Walk, "walk", "Runs along a space-filling curve: the paper's rule"),
-        (halftone::Method::Cells, "cells", "Compact clusters, no part thinner than its ink holds"),
-        (halftone::Method::Best, "best", "Cells, rearranged to lessen the error the eye sees; slower"),
-        (halftone::Method::Blue, "blue", "Single scattered dots (blue noise); for process inks alone"),
-        (
-            halftone::Method::Fine,
-            "fine",
-            "Small clusters that each dot picks from a table; for process inks alone",
-        ),
-    ];
-}
-
-impl Choice for art::Intent {
-    const ALL: &'static [(art::Intent, &'static str, &'static str)] = &[
-        (
-            art::Intent::Auto,
-            "auto",
-            "Perceptual for pictures, colorimetric for text and drawings; tints of cyan, magenta, yellow, red, green and blue keep those inks there",
-        ),
-        (
-            art::Intent::Perceptual,
-            "perceptual",
-            "Saturated colours move closer together, and differences between them survive",
-        ),
-        (
-            art::Intent::Colorimetric,
-            "colorimetric",
-            "Printable colours are kept; others become the nearest printable colour of their hue",
-        ),
-    ];
-}
-
-impl Choice for White {
-    const ALL: &'static [(White, &'static str, &'static str)] = &[
-        (White::None, "none", "No white at all, not even where the art draws it"),
-        (White::Under, "under", "Under every dot of every ink"),
-        (White::Reserved, "reserved", "Where the picture has the vendor's reserved white, 230,230,230"),
-        (White::Opaque, "opaque", "Where the picture is neither pure white nor transparent"),
-        (White::Silhouette, "silhouette", "Everything inside the outline, including holes and white areas"),
-        (White::Alpha, "alpha", "Where the picture is not transparent, including pure white"),
-    ];
-}
-
 impl Choice for art::Text {
     const ALL: &'static [(art::Text, &'static str, &'static str)] = &[
         (art::Text::Mixed, "mixed", "In its colour, mixed dot by dot like everything else"),
         (art::Text::Solid, "solid", "In the nearest solid, if one looks about like its colour: for labels"),
-    ];
-}
-
-impl Choice for Finish {
-    const ALL: &'static [(Finish, &'static str, &'static str)] = &[
-        (Finish::Artwork, "artwork", "On everything that is drawn"),
-        (Finish::All, "all", "On the whole rectangle of the artwork"),
-        (Finish::None, "none", "Nowhere, not even where the artwork draws it"),
     ];
 }
 

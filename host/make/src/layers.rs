@@ -7,10 +7,10 @@ use std::path::PathBuf;
 
 use art::{Artwork, Composed, Remedy, Room};
 use inks::{InkSet, Library};
-use observe::Observer;
+use observe::{Diagnosis, Observer};
 use press::job::plan::Suggestion;
 use press::layout;
-use press::pipeline::{self, Draft, Job, Request};
+use press::pipeline::{self, Draft, Job, JobError, Request};
 
 use crate::made::{Made, Subject};
 use crate::{Error, PageSettings};
@@ -76,8 +76,7 @@ impl<'a> Layers<'a> {
             observer,
         )?;
         // Before the long work.
-        layout::check(art.width / usize::from(across), art.length, layout)
-            .map_err(pipeline::JobError::from)?;
+        layout::check(art.width / usize::from(across), art.length, layout).map_err(JobError::from)?;
         Ok(art)
     }
 
@@ -89,7 +88,7 @@ impl<'a> Layers<'a> {
         art: &'a Artwork,
         settings: &'a Settings,
         observer: &dyn Observer,
-    ) -> Result<Layers<'a>, Error> {
+    ) -> Result<Layers<'a>, Diagnosis> {
         let composed = art::compose(art, &settings.compose, &settings.library, observer)?;
         Ok(Layers { name: &art.name, settings, composed })
     }
@@ -109,8 +108,8 @@ impl<'a> Layers<'a> {
     ///
     /// # Errors
     /// A layout without room, and rules that forbid the job.
-    pub fn job(&self, observer: &dyn Observer) -> Result<Job, Error> {
-        Ok(pipeline::job(&self.request(), observer)?)
+    pub fn job(&self, observer: &dyn Observer) -> Result<Job, JobError> {
+        pipeline::job(&self.request(), observer)
     }
 
     /// The job, proved on the simulated printer.

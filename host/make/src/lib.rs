@@ -37,6 +37,7 @@ pub mod choice;
 mod error;
 pub mod layers;
 pub mod made;
+pub mod options;
 pub mod print;
 mod report;
 pub mod shown;

@@ -28,8 +28,8 @@ use readers::Pixels;
 use serde_json::{Value, json};
 use sheet::Area;
 
-use crate::choice::name;
 use crate::made::{Made, Subject};
+use crate::options::HALFTONE;
 use crate::shown::{Mixture, Shown};
 use crate::view::View;
 use crate::{Error, PageSettings, report};
@@ -426,7 +426,7 @@ impl Seen {
                 "pictures": c.names, "straight": c.straight, "reflection": c.reflection,
             })),
             "halftone": {
-                "method": name(settings.dots.halftone), "look": dots.look, "tones": dots.tones,
+                "method": HALFTONE.name_of(|choices| choices.halftone == settings.dots.halftone), "look": dots.look, "tones": dots.tones,
                 "spectrum": dots.spectrum.as_ref().map(|spectrum| &spectrum.rings),
             },
         })

@@ -25,12 +25,13 @@ use protocol::ink::Ink;
 use protocol::paper::Paper;
 use tempfile::NamedTempFile;
 
-use super::options::{Choices, NoChoice, Spots, is_chosen};
+use super::options::NoChoice;
 use super::raster::{self, RasterError};
 use art::Page;
 use art::pdf::{Interpreter, Survey};
 use art::process::MOST_PAGES;
 use drawing::Drawing;
+use make::options::{Choices, Spots, is_chosen};
 use observe::{Diagnosis, Fault, Observer};
 use page::Press;
 use press::layout::Cut;
@@ -391,6 +392,7 @@ impl Suspected {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::options::{parse, read};
     use observe::Silent;
     use press::inspect::{inspect, sheets};
     use std::sync::Mutex;
@@ -457,7 +459,7 @@ mod tests {
 
     #[test]
     fn a_page_becomes_its_dots_without_the_margins_and_blank_pages_become_nothing() {
-        let usual = Choices::read(&[], None).unwrap();
+        let usual = read(&[], None).unwrap();
         let pages = [raster(600, &[[1000, 500, 1400, 800]]), raster(600, &[])[4..].to_vec()].concat();
         let (job, notes) = filtered(pages, &usual);
         assert_eq!(sheets(&job).len(), 1);
@@ -477,7 +479,7 @@ mod tests {
 
     #[test]
     fn pages_that_the_document_does_not_have_are_not_called_blank() {
-        let usual = Choices::read(&[], None).unwrap();
+        let usual = read(&[], None).unwrap();
         let pages =
             [raster(300, &[[500, 250, 700, 400]]), raster(300, &[[500, 250, 700, 400]])[4..].to_vec()];
         let chosen = |pages: &[u8], chosen| {
@@ -491,7 +493,7 @@ mod tests {
 
     #[test]
     fn a_draft_is_the_same_page_at_half_the_resolution() {
-        let usual = Choices::read(&[], None).unwrap();
+        let usual = read(&[], None).unwrap();
         let (job, _) = filtered(raster(300, &[[500, 250, 700, 400]]), &usual);
         let seen = inspect(&job, &Silent);
         let bounds = seen.inspection.passes[0].bounds.unwrap();
@@ -502,10 +504,8 @@ mod tests {
 
     #[test]
     fn the_choices_of_the_dialog_are_in_the_job() {
-        let options = super::super::options::parse(
-            "MediaType=Cardboard FoilpressCurl=Off FoilpressWhite=Under FoilpressFinish=All",
-        );
-        let choices = Choices::read(&options, None).unwrap();
+        let options = parse("MediaType=Cardboard FoilpressCurl=Off FoilpressWhite=Under FoilpressFinish=All");
+        let choices = read(&options, None).unwrap();
         let (job, _) = filtered(raster(600, &[[1000, 500, 1400, 800]]), &choices);
         let seen = inspect(&job, &Silent).inspection;
         assert_eq!((seen.setup.media, seen.setup.curl_correction), (Some("cardboard"), Some(false)));
@@ -516,7 +516,7 @@ mod tests {
     #[test]
     fn colours_that_the_user_names_are_inks_of_their_own() {
         let passes = |options: &str| {
-            let choices = Choices::read(&super::super::options::parse(options), None).unwrap();
+            let choices = read(&parse(options), None).unwrap();
             let (job, _) = filtered(raster(600, &[[1000, 500, 1400, 800]]), &choices);
             let passes = inspect(&job, &Silent).inspection.passes;
             passes.iter().map(|pass| (pass.ink, pass.dots)).collect::<Vec<_>>()
@@ -532,7 +532,7 @@ mod tests {
     #[test]
     fn a_page_that_comes_as_a_picture_is_mirrored_about_its_middle_and_moved_where_it_is_wanted() {
         let place = |options: &str| {
-            let choices = Choices::read(&super::super::options::parse(options), None).unwrap();
+            let choices = read(&parse(options), None).unwrap();
             let (job, _) = filtered(raster(600, &[[1000, 500, 1400, 800]]), &choices);
             let bounds = inspect(&job, &Silent).inspection.passes[0].bounds.unwrap();
             assert_eq!((bounds.width, bounds.height), (400, 300));
@@ -549,7 +549,7 @@ mod tests {
 
     #[test]
     fn what_lies_on_the_margins_is_told_in_millimetres() {
-        let usual = Choices::read(&[], None).unwrap();
+        let usual = read(&[], None).unwrap();
         // 71 rows at the top, 80 dots at the left; 2 mm are 47 dots.
         let marks = [[1000, 71 - 47, 1100, 300], [80 - 47, 1000, 200, 1100]];
         let (_, notes) = filtered(raster(600, &marks), &usual);
@@ -563,7 +563,7 @@ mod tests {
 
     #[test]
     fn a_page_that_does_not_go_in_is_refused_with_its_size() {
-        let usual = Choices::read(&[], None).unwrap();
+        let usual = read(&[], None).unwrap();
         let error = page::paper(3, (7016, 4961), 600, &usual).unwrap_err().to_string();
         assert!(error.contains("page 3 is 297 x 210 mm") && error.contains("215.9 x 355.6 mm"), "{error}");
     }
@@ -595,7 +595,7 @@ mod tests {
 
     #[test]
     fn what_is_no_document_is_refused() {
-        let usual = Choices::read(&[], None).unwrap();
+        let usual = read(&[], None).unwrap();
         for wrong in [&b"GIF89a"[..], b"", b"%P"] {
             let result = run(
                 io::Cursor::new(wrong.to_vec()),

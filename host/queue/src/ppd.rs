@@ -8,7 +8,8 @@ use std::fmt::Write as _;
 
 use protocol::paper::{LEFT, Paper};
 
-use super::options::{self, Custom, FEED, OFFSET};
+use super::options::{FEED, OFFSET};
+use make::options::{Custom, MIRROR, PAGE};
 use press::layout::{self, Mm, Point, Profile};
 use press::simulate::Stock;
 
@@ -107,15 +108,18 @@ pub fn description(profile: &Profile) -> String {
     // Writing to a string does not fail, here and below.
     let _ = writeln!(text, "*{OFFSET}: \"{x} {y}\"\n*{FEED}: \"{}\"", profile.feed);
     papers_into(&mut text);
-    for option in options::all() {
+    for option in PAGE {
         // The first choice is the default.
-        let (keyword, first) = (option.keyword, &option.choices[0].0);
+        let (keyword, kind) =
+            (option.keyword, if option.keyword == MIRROR.keyword { "Boolean" } else { "PickOne" });
+        let first = option.in_dialog().next().map_or("", |value| value.dialog.0);
         let _ = write!(
             text,
-            "\n*OpenUI *{keyword}/{}: PickOne\n*OrderDependency: 20 AnySetup *{keyword}\n*Default{keyword}: {first}\n",
+            "\n*OpenUI *{keyword}/{}: {kind}\n*OrderDependency: 20 AnySetup *{keyword}\n*Default{keyword}: {first}\n",
             option.text
         );
-        for (choice, words) in &option.choices {
+        for value in option.in_dialog() {
+            let (choice, words) = value.dialog;
             let _ = writeln!(text, "*{keyword} {choice}/{}: \"\"", translation(words));
         }
         let _ = writeln!(text, "*CloseUI: *{keyword}");
@@ -127,15 +131,7 @@ pub fn description(profile: &Profile) -> String {
             );
         }
     }
-    text.push_str(
-        "\n*OpenUI *MirrorPrint/Mirror (for prints seen from behind): Boolean\n\
-         *OrderDependency: 20 AnySetup *MirrorPrint\n\
-         *DefaultMirrorPrint: False\n\
-         *MirrorPrint False/No: \"\"\n\
-         *MirrorPrint True/Yes: \"\"\n\
-         *CloseUI: *MirrorPrint\n\
-         \n*DefaultFont: Courier\n*Font Courier: Standard \"(1.05)\" Standard ROM\n",
-    );
+    text.push_str("\n*DefaultFont: Courier\n*Font Courier: Standard \"(1.05)\" Standard ROM\n");
     text
 }
 

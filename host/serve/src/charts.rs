@@ -7,13 +7,13 @@
 
 use halftone::Method;
 use inks::{InkSet, Library, Stack};
+use make::options::Choices;
 use observe::{Observer, with_causes};
 use press::chart;
 use press::job::Handling;
 use press::layout::Layout;
 use press::pipeline::{self, Request};
 use protocol::ink::{Ink, Kind};
-use queue::options::Choices;
 
 /// Name, label, and what to look for.
 pub const CHARTS: [(&str, &str, &str); 5] = [
@@ -123,7 +123,7 @@ mod tests {
         let names = ["white", "gold-foil", "cyan", "white", "cartridge-99"];
         let found = inks(names.into_iter());
         assert_eq!(found, [Ink::White, Ink::Cyan]);
-        let choices = Choices { paper: Paper::Postcard, ..Choices::read(&[], None).unwrap() };
+        let choices = Choices { paper: Paper::Postcard, ..Choices::default() };
         let bytes = job("heads", &choices, &found, &Library::builtin(), &Silent).unwrap();
         let printed = inspect(&bytes, &Silent);
         let printed = InkSet::of(printed.passes.iter().map(|pass| pass.ink));
@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn a_chart_without_room_and_one_that_is_none_are_refused() {
-        let choices = Choices { paper: Paper::Postcard, ..Choices::read(&[], None).unwrap() };
+        let choices = Choices { paper: Paper::Postcard, ..Choices::default() };
         let inks = inks(std::iter::empty());
         for (name, words) in [("ramp", "ramp"), ("../first", "no such chart")] {
             let error = job(name, &choices, &inks, &Library::builtin(), &Silent).unwrap_err();

@@ -25,10 +25,11 @@ use crate::jobs::{Job, Owner, State};
 use crate::operations;
 use crate::server::{ChangeError, Data, Loaded, Server};
 use crate::spool::{Kind, Packing, Spool, SpoolError};
-use crate::template::{AUTO, SHEETS, TYPES, Ticket, keyword_of, size_of};
+use crate::template::{AUTO, SHEETS, Ticket, keyword_of, size_of};
 use crate::worker;
 use device::forms;
 use device::ledger::{Ledger, totals};
+use make::options::of_attribute;
 use press::preview::inks::{Ground, sheet_in_inks};
 use press::simulate::{Setup, print};
 use protocol::ink::Ink;
@@ -258,7 +259,7 @@ fn describe(server: &Server) -> Value {
     let sizes: Vec<Value> =
         SHEETS.iter().map(|(keyword, paper)| json!({ "keyword": keyword, "label": paper.name() })).collect();
     let types: Vec<Value> = std::iter::once((AUTO, "As the preset says"))
-        .chain(TYPES.iter().map(|row| (row.0, row.1)))
+        .chain(of_attribute("media-type").map(|(keyword, value)| (keyword, value.help)))
         .map(|(keyword, label)| json!({ "keyword": keyword, "label": label }))
         .collect();
     let charts = CHARTS.map(|(name, label, look)| json!({ "name": name, "label": label, "look": look }));

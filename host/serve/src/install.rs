@@ -213,7 +213,7 @@ fn advertisement(preset: &Preset, uuid: &str, port: u16) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use queue::options::Choices;
+    use make::options::Choices;
 
     fn everything(folder: &Path) -> Vec<PathBuf> {
         let mut all = Vec::new();
@@ -233,7 +233,7 @@ mod tests {
         fs::create_dir_all(&presets).unwrap();
         fs::write(presets.join("decal.toml"), "[options]\nmedia = \"film\"\n").unwrap();
         let preset = |name: &str| {
-            let choices = Choices::read(&[], None).unwrap();
+            let choices = Choices::default();
             (Preset { name: name.into(), about: "<&>".into(), choices }, format!("uuid-of-{name}"))
         };
         let places = Places::at(&root);

@@ -13,8 +13,8 @@ use crate::operations::{OPERATIONS, Place};
 use crate::server::{Cartridge, Preset, Server, identity};
 use crate::spool::KINDS;
 use crate::template::{
-    AUTO, COLOURS, CONTENTS, INTENTS, MOST_COPIES, OVERRIDES, QUALITIES, RESOLUTIONS, SHEETS, Size, TYPES,
-    keyword_of, margins, paper, size, sizes,
+    AUTO, MOST_COPIES, OVERRIDES, QUALITIES, RESOLUTIONS, SHEETS, Size, keyword_of, margins, paper, size,
+    sizes, supported,
 };
 use crate::values::{
     charset, collection, date_time, dpi, integer, keyword, keywords, language, list, long_text, mime, name,
@@ -125,7 +125,7 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
             formats.push(kind.mime);
         }
     });
-    let types = || TYPES.iter().map(|row| row.0).chain([AUTO]);
+    let types = || supported("media-type").chain([AUTO]);
     let none = Cartridge { name: "unknown".into(), colour: "none", is_loaded: true };
     let cartridges =
         if data.cartridges.is_empty() { std::slice::from_ref(&none) } else { &data.cartridges[..] };
@@ -318,13 +318,13 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
         (T, "overrides-supported", keywords(OVERRIDES)),
         (T, "page-ranges-supported", IppValue::Boolean(true)),
         (T, "print-color-mode-default", keyword(AUTO)),
-        (T, "print-color-mode-supported", keywords(COLOURS)),
+        (T, "print-color-mode-supported", keywords(supported("print-color-mode"))),
         (T, "print-content-optimize-default", keyword(AUTO)),
-        (T, "print-content-optimize-supported", keywords(CONTENTS.iter().map(|row| row.0))),
+        (T, "print-content-optimize-supported", keywords(supported("print-content-optimize"))),
         (T, "print-quality-default", IppValue::Enum(4)),
         (T, "print-quality-supported", list(QUALITIES.map(IppValue::Enum))),
         (T, "print-rendering-intent-default", keyword(AUTO)),
-        (T, "print-rendering-intent-supported", keywords(INTENTS.iter().map(|row| row.0))),
+        (T, "print-rendering-intent-supported", keywords(supported("print-rendering-intent"))),
         (T, "print-scaling-default", keyword(AUTO)),
         (T, "print-scaling-supported", keyword(AUTO)),
         (T, "printer-resolution-default", dpi(600)),

@@ -13,15 +13,15 @@ use std::time::Instant;
 pub use self::data::{Cartridge, Data, Loaded, identities, identity};
 use self::data::{Kept, keep, kept};
 use crate::jobs::{Job, Owner, State, Store, StoreError, after_restart};
-use crate::template::{TYPES, Ticket, paper};
+use crate::template::{Ticket, paper, supported};
 use crate::values::now;
 use device::connection::Destination;
 use device::printers::Printers;
 use files::durable::{self, Access};
 use inks::Library;
+use make::options::Choices;
 use observe::Observer;
 use queue::backend;
-use queue::options::Choices;
 
 /// The most jobs that wait.
 pub const MOST_JOBS: usize = 500;
@@ -377,7 +377,8 @@ impl Server {
     /// # Errors
     /// The printer takes no such sheet, or it cannot be kept.
     pub fn load(&self, loaded: Loaded) -> Result<(), ChangeError> {
-        let is_kind = loaded.kind == crate::template::AUTO || TYPES.iter().any(|row| row.0 == loaded.kind);
+        let is_kind =
+            loaded.kind == crate::template::AUTO || supported("media-type").any(|known| known == loaded.kind);
         if paper(loaded.size).is_none() || !is_kind {
             return Err(ChangeError::Sheet);
         }

@@ -1,9 +1,8 @@
-//! The options of print dialogs, and what they mean here: one table for what a printer offers, what a job asks for, and what is drawn.
+//! What a job may ask for: sheets, and the attributes of [`make::options::PAGE`].
 //!
 //! Problem: dialogs show size, type of sheet, quality, colour and copies, and nothing else; white, finish and spot colours are invisible
 //! to them. Method: those are a preset's, and each preset is a printer of its own; what dialogs show changes the preset's choices.
-//! `media-type` is the sheet and its curl, `print-quality` the resolution and the halftone, `print-content-optimize` and
-//! `print-rendering-intent` what becomes of colours out of reach, `print-color-mode` the inks.
+//! A value that the table has no row for, such as `auto`, is the preset's own.
 //! Limits: a sheet has one side and no finishings, and is printed upright.
 //! Source: RFC 8011, section 5.2; PWG 5100.3, 5100.7 and 5101.1.
 
@@ -11,17 +10,12 @@ use std::ops::RangeInclusive;
 
 use ipp::value::IppValue;
 use protocol::paper::Paper;
-use protocol::rgl::Media;
 use serde::{Deserialize, Serialize};
 
 use crate::server::Loaded;
 use crate::values::{each, read_text};
-use art::Intent;
-use halftone::Method;
-use inks::InkSet;
+use make::options::{Choices, of_attribute};
 use press::layout::paper::{custom_margins, custom_range, sheet_mm, table};
-use protocol::ink::Ink;
-use queue::options::Choices;
 use queue::ppd::paper_of;
 
 /// The sheets with a name, by the names of PWG 5101.1.
@@ -34,34 +28,25 @@ pub const SHEETS: [(&str, Paper); 6] = [
     ("jpn_hagaki_100x148mm", Paper::Postcard),
 ];
 
-/// What sheets are made of: keyword, words for people, the printer's media and whether it corrects the curl. The preset's own is `auto`.
-pub const TYPES: [(&str, &str, Media, bool); 6] = [
-    ("stationery", "Paper", Media::Plain, true),
-    ("cardstock", "Card", Media::Cardboard, true),
-    ("film", "Decal film", Media::Plain, false),
-    ("photographic-glossy", "Glossy paper", Media::GlossyPaper, true),
-    ("transparency", "Transparency", Media::Transparency, true),
-    ("labels", "Glossy labels", Media::GlossyLabel, true),
-];
-
 /// The type of sheet that a preset has.
 pub const AUTO: &str = "auto";
 
 /// `print-quality`: drafts are drawn at half the resolution, the best halftone searches.
 pub const QUALITIES: [i32; 3] = [3, 4, 5];
-/// `print-color-mode`.
-pub const COLOURS: [&str; 3] = ["auto", "color", "monochrome"];
-/// `print-content-optimize`, and the intent of each.
-pub const CONTENTS: [(&str, Option<Intent>); 5] = [
-    ("auto", None),
-    ("photo", Some(Intent::Perceptual)),
-    ("graphic", Some(Intent::Colorimetric)),
-    ("text", Some(Intent::Colorimetric)),
-    ("text-and-graphic", Some(Intent::Colorimetric)),
+/// What each attribute of a keyword may also be, which leaves the preset as it is; first those of the preset, then what the table has.
+const OWN: [(&str, &[&str]); 4] = [
+    ("print-content-optimize", &[AUTO]),
+    ("print-rendering-intent", &[AUTO]),
+    ("print-color-mode", &[AUTO, "color"]),
+    ("media-type", &[]),
 ];
-/// `print-rendering-intent`, and the intent of each.
-pub const INTENTS: [(&str, Option<Intent>); 3] =
-    [("auto", None), ("perceptual", Some(Intent::Perceptual)), ("relative", Some(Intent::Colorimetric))];
+
+/// What an attribute may be, by keywords.
+pub fn supported(attribute: &str) -> impl Iterator<Item = &'static str> {
+    let own = OWN.into_iter().find(|(known, _)| *known == attribute).map_or(&[][..], |row| row.1);
+    own.iter().copied().chain(of_attribute(attribute).map(|(keyword, _)| keyword))
+}
+
 /// The most copies.
 pub const MOST_COPIES: i32 = 99;
 /// Resolutions of the drawing.
@@ -186,15 +171,30 @@ impl Default for Ticket {
 }
 
 impl Ticket {
+    /// Takes an attribute whose values are words, or an enum whose number is written as one; false if it or its value is not possible here.
+    pub fn ask(&mut self, attribute: &str, word: &str) -> bool {
+        if attribute == "print-quality" {
+            let found = word.parse().ok().filter(|quality| QUALITIES.contains(quality));
+            self.quality = found.or(self.quality);
+            return found.is_some();
+        }
+        let place = match attribute {
+            "media-type" => &mut self.kind,
+            "print-content-optimize" => &mut self.content,
+            "print-rendering-intent" => &mut self.intent,
+            "print-color-mode" => &mut self.colour,
+            _ => return false,
+        };
+        let fits = word == AUTO || supported(attribute).any(|known| known == word);
+        if fits {
+            *place = Some(word.into());
+        }
+        fits
+    }
+
     /// Takes one attribute of a job; false if it or its value is not possible here.
     pub fn take(&mut self, name: &str, value: &IppValue) -> bool {
         let word = || read_text(value);
-        let one_of = |known: &[&str]| read_text(value).filter(|word| known.contains(&word.as_str()));
-        let set = |place: &mut Option<String>, found: Option<String>| {
-            let fits = found.is_some();
-            *place = found.or(place.take());
-            fits
-        };
         match (name, value) {
             ("copies", IppValue::Integer(copies)) => match u32::try_from(*copies) {
                 Ok(number @ 1..) if *copies <= MOST_COPIES => {
@@ -230,26 +230,10 @@ impl Ticket {
                     _ => true,
                 }
             }),
-            ("media-type", _) => {
-                let found = one_of(&[&TYPES.map(|row| row.0)[..], &[AUTO]].concat());
-                set(&mut self.kind, found)
+            ("media-type" | "print-content-optimize" | "print-rendering-intent" | "print-color-mode", _) => {
+                word().is_some_and(|word| self.ask(name, &word))
             }
-            ("print-quality", IppValue::Enum(quality)) if QUALITIES.contains(quality) => {
-                self.quality = Some(*quality);
-                true
-            }
-            ("print-content-optimize", _) => {
-                let found = one_of(&CONTENTS.map(|row| row.0));
-                set(&mut self.content, found)
-            }
-            ("print-rendering-intent", _) => {
-                let found = one_of(&INTENTS.map(|row| row.0));
-                set(&mut self.intent, found)
-            }
-            ("print-color-mode", _) => {
-                let found = one_of(&COLOURS);
-                set(&mut self.colour, found)
-            }
+            ("print-quality", IppValue::Enum(quality)) => self.ask(name, &quality.to_string()),
             ("page-ranges", _) => each(value).iter().all(|range| match range {
                 IppValue::RangeOfInteger { min, max } if 1 <= *min && min <= max => {
                     self.pages.push((*min, *max));
@@ -302,21 +286,20 @@ impl Ticket {
     /// What a preset's printer draws for this job.
     pub fn choices(&self, preset: &Choices) -> Choices {
         let mut choices = preset.clone();
-        if let Some((_, _, media, curl)) = TYPES.into_iter().find(|row| self.kind.as_deref() == Some(row.0)) {
-            (choices.media, choices.curl_correction) = (media, curl);
-        }
-        match self.quality {
-            Some(3) => choices.dpi = 300,
-            Some(5) => choices.halftone = Method::Best,
-            _ => {}
-        }
-        let asked = |table: &[(&str, Option<Intent>)], word: &Option<String>| {
-            table.iter().find(|row| word.as_deref() == Some(row.0)).and_then(|row| row.1)
-        };
-        let intent = asked(&INTENTS, &self.intent).or(asked(&CONTENTS, &self.content));
-        choices.intent = intent.unwrap_or(choices.intent);
-        if self.colour.as_deref() == Some("monochrome") {
-            choices.colours = InkSet::of([Ink::Black]);
+        let quality = self.quality.map(|quality| quality.to_string());
+        // The rendering intent has the last word on colours.
+        let asked = [
+            ("media-type", &self.kind),
+            ("print-quality", &quality),
+            ("print-content-optimize", &self.content),
+            ("print-rendering-intent", &self.intent),
+            ("print-color-mode", &self.colour),
+        ];
+        for (attribute, word) in asked {
+            let word = word.as_deref();
+            if let Some((_, value)) = of_attribute(attribute).find(|(keyword, _)| Some(*keyword) == word) {
+                (value.set)(&mut choices);
+            }
         }
         choices.pages = self.pages();
         if let Some(paper) = self.size.and_then(paper) {
@@ -330,6 +313,11 @@ impl Ticket {
 mod tests {
     use super::*;
     use crate::values::{collection, keyword};
+    use art::{Intent, White};
+    use halftone::Method;
+    use inks::InkSet;
+    use protocol::ink::Ink;
+    use protocol::rgl::Media;
 
     #[test]
     fn a_sheet_comes_back_from_its_keyword_and_has_the_margins_of_its_own() {
@@ -357,7 +345,7 @@ mod tests {
 
     #[test]
     fn what_a_dialog_asks_changes_the_preset_and_nothing_else() {
-        let preset = Choices::read(&[("FoilpressWhite".into(), "Under".into())], None).unwrap();
+        let preset = Choices { white: White::Under, ..Choices::default() };
         let mut ticket = Ticket::default();
         assert_eq!(ticket.choices(&preset), preset);
         let size = collection([

@@ -24,11 +24,11 @@ use crate::server::{Cartridge, ChangeError, Server};
 use crate::spool::JOB;
 use crate::values::now;
 use device::questions::status::Status;
+use make::options::is_chosen;
 use queue::backend::{self, Sheets};
 use queue::call::{Call, Exit};
 use queue::filter::{self, FilterError};
 use queue::messages::{Reason, Report, colour};
-use queue::options::is_chosen;
 
 /// Prints one job after the other, for ever.
 pub fn work(server: &Server) -> ! {

@@ -3,18 +3,18 @@
 use std::io::Write;
 use std::path::Path;
 
-use inks::{InkSet, Library};
+use inks::Library;
 use protocol::ink::{Ink, Kind};
 use protocol::paper::Paper;
 
 use super::{FilterError, io_error};
-use crate::options::{Choices, Place, Spots, is_chosen};
 use crate::ppd;
 use art::{Artwork, Room, Window};
+use make::options::{Choices, Place, is_chosen};
+use make::{Layers, layers};
 use observe::Observer;
-use press::job::Handling;
 use press::layout::{Cut, Layout, LayoutError, Mm, Point, Position};
-use press::pipeline::{self, JobError, Request};
+use press::pipeline::JobError;
 use press::separate::CARTRIDGES;
 
 /// What makes jobs of pages.
@@ -55,43 +55,8 @@ impl Press<'_> {
 
     /// How a page is read, drawn at so many pixels an inch.
     pub(super) fn options(&self, dpi: u16) -> art::Options {
-        let choices = self.choices;
-        let mut reserved = InkSet::EMPTY;
-        if choices.spots == Spots::Reserved {
-            reserved = art::Options::default().inks;
-        } else if choices.white == art::White::Reserved {
-            reserved = reserved.with(Ink::White);
-        }
-        art::Options {
-            dpi: Some(dpi.into()),
-            reserved: !reserved.is_empty(),
-            inks: reserved,
-            colours: choices.inks_of.clone(),
-            tolerance: choices.tolerance,
-            ..art::Options::default()
-        }
-    }
-
-    /// How its layers become stacks.
-    fn settings(&self) -> art::Settings {
-        let choices = self.choices;
-        let spots = Ink::ALL.into_iter().filter(|ink| match ink.kind() {
-            Kind::Process => choices.colours.contains(*ink),
-            Kind::Foil => choices.foils && choices.more.inks.contains(*ink),
-            _ => choices.more.inks.contains(*ink),
-        });
-        art::Settings {
-            inks: InkSet::of(spots),
-            // What the page itself draws in white or finish is printed whatever is chosen.
-            // Its reserved white is a layer of it, see `options`.
-            white: Some(choices.white)
-                .filter(|white| !matches!(white, art::White::None | art::White::Reserved)),
-            finish: Some(choices.finish).filter(|&finish| finish != art::Finish::None),
-            intent: choices.intent,
-            gamma: choices.gamma,
-            halftone: choices.halftone,
-            ..choices.more.clone()
-        }
+        let read = self.choices.settings(self.choices.paper, self.library).read;
+        art::Options { dpi: Some(dpi.into()), ..read }
     }
 
     /// Where a page is printed. `drawn` is the window around everything on it, none if it is blank. Notes why nothing is
@@ -116,7 +81,7 @@ impl Press<'_> {
             return Ok(None);
         };
         let in_layout = |error: LayoutError| FilterError::Job { page: number, source: error.into() };
-        let layout = self.layout(paper, mirrored);
+        let layout = self.settings(paper, mirrored).page.layout;
         match View::of(self.choices.place, &layout, (size, dpi), drawn).map_err(in_layout)? {
             Ok(view) => Ok(Some(view)),
             Err(beyond) => {
@@ -130,9 +95,11 @@ impl Press<'_> {
         }
     }
 
-    /// How a page is laid on its paper, in the middle of it.
-    fn layout(&self, paper: Paper, mirror: bool) -> Layout {
-        Layout { mirror, cut: true, profile: self.choices.profile, ..Layout::centred(paper) }
+    /// How a page is printed, in the middle of its paper.
+    fn settings(&self, paper: Paper, mirror: bool) -> layers::Settings {
+        let mut settings = self.choices.settings(paper, self.library);
+        settings.page.layout.mirror = mirror;
+        settings
     }
 
     /// The job of a picture that has no page of its own: in the middle of the sheet, as large as it says or as fits.
@@ -151,7 +118,8 @@ impl Press<'_> {
             Place::At(corner) => Position::FromEdge(corner),
             Place::Page | Place::Centre => Position::Centred,
         };
-        let layout = Layout { position, ..self.layout(self.choices.paper, self.choices.mirror) };
+        let laid = self.settings(self.choices.paper, self.choices.mirror).page.layout;
+        let layout = Layout { position, ..laid };
         let placed = layout.placed((art.width, art.length));
         let (_, beyond) = placed.map_err(|error| FilterError::Job { page: 1, source: error.into() })?;
         let view = View { position, beyond };
@@ -167,9 +135,10 @@ impl Press<'_> {
         view: &View,
         mirrored: bool,
     ) -> Result<Vec<u8>, FilterError> {
-        let settings = self.settings();
+        let mut settings = self.settings(paper, mirrored);
+        settings.page.layout.position = view.position;
         let foil = art.layers.iter().map(|layer| layer.ink).find(|ink| ink.kind() == Kind::Foil);
-        if let Some(ink) = foil.filter(|&ink| !settings.inks.contains(ink)) {
+        if let Some(ink) = foil.filter(|&ink| !settings.compose.inks.contains(ink)) {
             return Err(FilterError::Foil { page: number, ink });
         }
         if art.layers.iter().any(|layer| layer.ink == Ink::White) {
@@ -179,22 +148,12 @@ impl Press<'_> {
                 "page {number}: nothing has the reserved white 230,230,230; no white is printed"
             ));
         }
-        let composed = art::compose(art, &settings, self.library, self.observer)
+        let layers = Layers::compose(art, &settings, self.observer)
             .map_err(|source| FilterError::Layers { page: number, source })?;
-        for suggestion in &composed.suggestions {
+        for suggestion in &layers.composed.suggestions {
             self.observer.note(&format!("page {number}: {}", suggestion.text));
         }
-        let layout = Layout { position: view.position, ..self.layout(paper, mirrored) };
-        let handling = Handling { media: self.choices.media, curl_correction: self.choices.curl_correction };
-        let request = Request {
-            name: &art.name,
-            dots: &composed.dots,
-            layout: &layout,
-            handling,
-            allowed: settings.inks,
-            library: self.library,
-        };
-        let job = pipeline::job(&request, self.observer).map_err(|error| unprintable(number, error))?;
+        let job = layers.job(self.observer).map_err(|error| unprintable(number, error))?;
         if let Some(cut) = view.beyond {
             self.observer
                 .note(&format!("page {number}: {cut} lies on the margins, where the printer cannot print"));

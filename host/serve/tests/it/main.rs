@@ -14,8 +14,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use inks::Library;
+use make::options::Choices;
 use observe::Silent;
-use queue::options::Choices;
 use serve::http::{Limits, run};
 use serve::server::{Preset, Server, Settings};
 use tempfile::TempDir;
@@ -33,7 +33,7 @@ impl Running {
     /// With these limits. `prints` says whether anything becomes of jobs.
     pub fn start(limits: Limits, prints: bool) -> Running {
         let folder = tempfile::tempdir().unwrap();
-        let choices = Choices::read(&[], None).unwrap();
+        let choices = Choices::default();
         let settings = Settings {
             to: format!("file:{}", folder.path().join("sheets").display()).parse().unwrap(),
             printers: vec![Preset { name: "standard".into(), about: "ALPS MD-5500".into(), choices }],

@@ -6,6 +6,7 @@ use std::str::FromStr;
 
 use clap::builder::{OsStringValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 use make::choice::Choice;
+use make::options::{Choices, PageOption};
 
 /// Reads a value by its name. Help and completion list the names.
 pub fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {
@@ -15,6 +16,17 @@ pub fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {
     });
     PossibleValuesParser::new(names).try_map(|name| {
         T::ALL.iter().find(|(_, known, _)| *known == name).map(|(value, ..)| *value).ok_or("unknown name")
+    })
+}
+
+/// Reads a value of a page's option by its name. `get` takes it from the choices.
+pub fn of_page<T: Clone + Send + Sync + 'static>(
+    option: &'static PageOption,
+    get: fn(Choices) -> T,
+) -> impl TypedValueParser<Value = T> {
+    let names = option.typed().map(|value| PossibleValue::new(value.name).help(value.help));
+    PossibleValuesParser::new(names).try_map(move |name| {
+        option.typed().find(|value| value.name == name).map(|value| value.of(get)).ok_or("unknown name")
     })
 }
 

@@ -5,9 +5,11 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use inks::InkSet;
+use make::options::{CURL, Choices, MEDIA, MIRROR, POSITION};
 use protocol::paper::Paper;
-use protocol::rgl::{Media, Resolution};
+use protocol::rgl::Resolution;
 
+use crate::cli::arguments::choice::of_page;
 use crate::folders;
 use observe::Observer;
 use press::job::Handling;
@@ -22,8 +24,7 @@ pub struct LayoutArgs {
     /// Paper size: a4, letter, legal, executive, b5, postcard, or the size of the sheet such as 120x180mm
     #[arg(long, default_value = "a4", value_parser = layout::paper::read)]
     pub paper: Paper,
-    /// Position of the top left corner, across and down, such as 20x30mm; sheets lie up to 1 mm off sideways [default: centred]
-    #[arg(long, value_name = "X,Y", allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y", help = POSITION.help, allow_hyphen_values = true)]
     pub at: Option<Point>,
     /// Edge that --at is measured from
     #[arg(long, value_name = "WHERE", default_value = "edge", requires = "at")]
@@ -34,10 +35,7 @@ pub struct LayoutArgs {
     /// Space between repeats, such as 2mm, or across and down, such as 2x5mm
     #[arg(long, value_name = "LENGTH", default_value = "0", value_parser = gap)]
     pub gap: Point,
-    /// Mirror the print left to right
-    ///
-    /// For water-slide decals applied face down, or window decals seen from inside.
-    #[arg(long)]
+    #[arg(long, help = MIRROR.help, long_help = MIRROR.long_help())]
     pub mirror: bool,
     /// Print crop marks: ticks that show where to cut
     #[arg(long)]
@@ -162,48 +160,28 @@ pub fn profile(name: Option<&str>, observer: &dyn Observer) -> Result<Profile> {
 /// What the sheet is made of.
 #[derive(Args, Debug)]
 pub struct MediaArgs {
-    /// Material of the sheet: paper, thick (card) or film (decal film)
-    ///
-    /// film turns curl correction off. The printer's own media types, such as plain, cardboard, glossy-paper, are known, too.
-    #[arg(long, default_value = "paper", value_parser = handling)]
+    #[arg(long, help = MEDIA.help, long_help = MEDIA.long_help(), default_value = "paper", value_parser = handling)]
     pub media: Handling,
-    /// Curl correction of the printer [default: off for film, on for everything else]
-    #[arg(long, value_name = "on|off")]
-    pub curl: Option<Curl>,
-}
-
-/// Curl correction.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
-pub enum Curl {
-    /// The printer corrects the curl of the sheet
-    On,
-    /// The printer leaves the sheet as it is, so that decals stay on their film
-    Off,
+    #[arg(long, value_name = "on|off", help = CURL.help, value_parser = of_page(&CURL, |choices| choices.curl_correction))]
+    pub curl: Option<bool>,
 }
 
 impl MediaArgs {
     /// How the printer is to treat the sheet.
     pub fn handling(&self) -> Handling {
-        let curl_correction = self.curl.map_or(self.media.curl_correction, |curl| curl == Curl::On);
+        let curl_correction = self.curl.unwrap_or(self.media.curl_correction);
         Handling { curl_correction, ..self.media }
     }
 }
 
-/// What owners print on, by their own words: decals come off film that went through curl correction.
-const STOCKS: [(&str, Handling); 3] = [
-    ("paper", Handling { media: Media::Plain, curl_correction: true }),
-    ("thick", Handling { media: Media::Cardboard, curl_correction: true }),
-    ("film", Handling { media: Media::Plain, curl_correction: false }),
-];
-
-/// One of [`STOCKS`] or a media type by its name.
+/// What a sheet is made of by its name: in the words of owners, whose decals come off film that went through curl correction, or one of the
+/// printer's own media types.
 fn handling(name: &str) -> Result<Handling, String> {
-    if let Some((_, handling)) = STOCKS.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)) {
-        return Ok(*handling);
-    }
-    Media::from_name(name).map(|media| Handling { media, curl_correction: true }).ok_or_else(|| {
-        let names: Vec<&str> =
-            STOCKS.iter().map(|(name, _)| *name).chain(Media::all().map(Media::name)).collect();
+    let found = MEDIA.typed().find(|value| value.name.eq_ignore_ascii_case(name));
+    let handling =
+        |choices: Choices| Handling { media: choices.media, curl_correction: choices.curl_correction };
+    found.map(|value| value.of(handling)).ok_or_else(|| {
+        let names: Vec<&str> = MEDIA.typed().map(|value| value.name).collect();
         format!("expected one of the media {}", names.join(", "))
     })
 }

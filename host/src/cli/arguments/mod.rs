@@ -14,13 +14,14 @@ use clap::Args;
 use files::shelf::Disk;
 use inks::{InkSet, InkSetError, Library, Trust};
 use make::choice::{Metric, name};
+use make::options::HALFTONE;
 use make::print::SEED;
 
 use appearance::document::{self, ColourSpace, Document};
 use appearance::factor::{self, Method};
 use appearance::gamut::{self, Intent};
 
-use crate::cli::arguments::choice::{choice, utf8, whole};
+use crate::cli::arguments::choice::{choice, of_page, utf8, whole};
 use crate::cli::console::usage;
 use crate::libraries;
 use observe::Observer;
@@ -246,9 +247,7 @@ impl InkArgs {
 /// How mixtures become dots.
 #[derive(Args, Debug)]
 pub struct HalftoneArg {
-    /// How the stack of each dot is chosen where the art has tones; solid dots are printed as they are
-    /// [default: fine for the process inks of flat art, else cells]
-    #[arg(long, value_name = "METHOD", value_parser = choice::<halftone::Method>())]
+    #[arg(long, value_name = "METHOD", help = HALFTONE.help, value_parser = of_page(&HALFTONE, |choices| choices.halftone))]
     pub halftone: Option<halftone::Method>,
 }
 

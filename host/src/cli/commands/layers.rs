@@ -7,12 +7,15 @@ use clap::Args as ClapArgs;
 use inks::{InkSet, InkSetError, Library};
 use make::PageSettings;
 use make::layers::{Layers, Settings};
+use make::options::{COLOUR, FINISH, GAMMA, INKS, INTENT, SPOTS, TOLERANCE, WHITE};
+#[cfg(feature = "serve")]
+use make::options::{Choices, Place, Spots};
 use protocol::ink::Ink;
 use protocol::rgl::Resolution;
 use serde_json::{Value, json};
 
 use crate::cli::arguments::HalftoneArg;
-use crate::cli::arguments::choice::{choice, whole};
+use crate::cli::arguments::choice::{choice, of_page, whole};
 use crate::cli::arguments::layout::{LayoutArgs, MediaArgs};
 use crate::cli::commands::preset::PresetArg;
 use crate::cli::console::advice;
@@ -37,16 +40,11 @@ pub struct LayersArgs {
     /// channels, an SVG or OpenRaster file with named layers, a PDF or PostScript file, or one picture
     #[arg(value_name = "ART", required = true)]
     pub art: Vec<PathBuf>,
-    /// Print the vendor's reserved colours in their inks: white 230,230,230, gold 225,160,0, silver 189,193,197,
-    /// metallic red 163,36,115, metallic blue 0,176,201, black 0,0,0
-    #[arg(long)]
+    #[arg(long, help = SPOTS.help)]
     pub reserved: bool,
-    /// Print colours of the art in inks, such as "#ff0000=gold,808080=silver"; may be repeated
-    #[arg(long, value_name = "RRGGBB=INK", value_delimiter = ',', value_parser = names::colour)]
+    #[arg(long, value_name = "RRGGBB=INK", help = COLOUR.help, value_delimiter = ',', value_parser = names::colour)]
     pub colour: Vec<(Ink, [u8; 3])>,
-    /// Largest difference of red, green and blue from a colour that stands for an ink, 0 to 60 [default: 8 for the vendor's
-    /// white and black, 12 for others]
-    #[arg(long, value_name = "STEPS", value_parser = whole(TOLERANCES))]
+    #[arg(long, value_name = "STEPS", help = TOLERANCE.help, value_parser = whole(TOLERANCES))]
     pub tolerance: Option<u8>,
     /// Resolution of the pictures in pixels per inch, if a file states none or a wrong one; of a drawing that states no size on
     /// paper, its units per inch
@@ -66,9 +64,7 @@ pub struct LayersArgs {
     /// How text in colours between the inks is printed
     #[arg(long, value_name = "HOW", value_parser = choice::<art::Text>(), default_value = "mixed")]
     pub text: art::Text,
-    /// Inks that may be used: names and the groups process, metallic, clear, foil, all, separated by commas; + and -
-    /// change the default [default: all but the foils]
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    #[arg(long, value_name = "LIST", help = INKS.help, allow_hyphen_values = true)]
     pub inks: Option<String>,
     /// Order from the paper up: rules, given, or a list of inks such as white,black,white
     /// [default: the numbers in the file names, else the ink library's rules]
@@ -82,8 +78,7 @@ pub struct LayersArgs {
     /// Inks that knock out the process inks beneath them, or none [default: metallic]
     #[arg(long, value_name = "INKS")]
     pub knockout: Option<String>,
-    /// Where white is printed [default: where the artwork draws it]
-    #[arg(long, value_name = "MODE", value_parser = choice::<White>())]
+    #[arg(long, value_name = "MODE", help = WHITE.help, value_parser = of_page(&WHITE, |choices| choices.white))]
     pub white: Option<White>,
     /// Shrink the white by this length, such as 0.1mm, so that it does not show beside the colours
     #[arg(long, value_name = "LENGTH", value_parser = length, conflicts_with = "spread")]
@@ -91,14 +86,17 @@ pub struct LayersArgs {
     /// Spread the white by this length, such as 0.1mm
     #[arg(long, value_name = "LENGTH", value_parser = length)]
     pub spread: Option<f64>,
-    /// Where glossy finish is printed [default: where the artwork draws it]
-    #[arg(long, value_name = "WHERE", value_parser = choice::<Finish>())]
+    #[arg(long, value_name = "WHERE", help = FINISH.help, value_parser = of_page(&FINISH, |choices| choices.finish))]
     pub finish: Option<Finish>,
-    /// What is printed for colours that the inks do not reach
-    #[arg(long, value_name = "INTENT", value_parser = choice::<Intent>(), default_value = "auto")]
+    #[arg(
+        long,
+        value_name = "INTENT",
+        help = INTENT.help,
+        value_parser = of_page(&INTENT, |choices| choices.intent),
+        default_value = "auto"
+    )]
     pub intent: Intent,
-    /// Brighten the colours of pictures by this exponent, 0.2 to 5; below 1 darkens them
-    #[arg(long, value_name = "EXPONENT", value_parser = gamma, default_value_t = 1.0)]
+    #[arg(long, value_name = "EXPONENT", help = GAMMA.help, value_parser = gamma, default_value_t = 1.0)]
     pub gamma: f64,
     /// Suggestions of the plan to accept, separated by commas
     #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = choice::<Accept>())]
@@ -369,9 +367,8 @@ pub struct PlanArgs {
 impl Args {
     /// The same choices as a print dialog makes them, for documents that come from elsewhere.
     #[cfg(feature = "serve")]
-    pub fn choices(&self, observer: &dyn Observer) -> Result<queue::options::Choices> {
+    pub fn choices(&self, observer: &dyn Observer) -> Result<Choices> {
         use press::layout::Position;
-        use queue::options::{Choices, Place, Spots};
         let Work { layers, layout, media, .. } = &self.work;
         let (settings, layout, handling) = (layers.settings()?, layout.layout(observer)?, media.handling());
         let process = InkSet::of([Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black]);
@@ -478,4 +475,80 @@ fn words(composed: &Composed) -> String {
         ));
     }
     text
+}
+
+#[cfg(all(test, feature = "serve"))]
+mod tests {
+    use super::*;
+    use clap::Parser;
+    use make::options::PAGE;
+    use observe::Silent;
+    use queue::options::read;
+    use serve::template::Ticket;
+
+    #[derive(Parser)]
+    struct Command {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    /// What the command line chooses; what no dialog shows is left out.
+    fn typed(words: &[&str]) -> Choices {
+        let words = ["layers", "art.png"].iter().chain(words);
+        let choices = Command::parse_from(words).args.choices(&Silent).unwrap();
+        Choices { more: art::Settings::default(), ..choices }
+    }
+
+    fn picked(keyword: &str, value: &str) -> Choices {
+        read(&[(keyword.into(), value.into())], None).unwrap()
+    }
+
+    #[test]
+    fn every_option_means_the_same_through_every_door() {
+        let (bare, usual) = (typed(&[]), Choices::default());
+        let mut doors = [0; 3];
+        for (option, value) in PAGE.iter().flat_map(|option| option.values.iter().map(move |v| (option, v))) {
+            let wish = |choices: &Choices| {
+                let mut choices = choices.clone();
+                (value.set)(&mut choices);
+                choices
+            };
+            if !value.name.is_empty() {
+                let option = format!("--{}", option.name);
+                let halftone_alone = ["fine", "blue"].contains(&value.name);
+                assert_eq!(typed(&[&option, value.name]), wish(&bare), "{option} {}", value.name);
+                doors[0] += usize::from(!halftone_alone);
+            }
+            if !value.dialog.0.is_empty() {
+                assert_eq!(picked(option.keyword, value.dialog.0), wish(&usual), "{:?}", value.dialog);
+                doors[1] += 1;
+            }
+            for (attribute, word) in value.attributes {
+                let mut ticket = Ticket::default();
+                assert!(ticket.ask(attribute, word), "{attribute}={word}");
+                assert_eq!(ticket.choices(&bare), wish(&bare), "{attribute}={word}");
+                doors[2] += 1;
+            }
+        }
+        // Sheets alone are twenty-three on the command line.
+        assert!(doors[0] > 30 && doors[1] > 40 && doors[2] > 10, "{doors:?}");
+    }
+
+    #[test]
+    fn what_is_typed_freely_is_read_alike() {
+        for (words, keyword, value) in [
+            (&["--gamma", "1.7"][..], "FoilpressGamma", "1.7"),
+            (&["--at", "20x30mm"], "FoilpressPosition", "Custom.20x30mm"),
+            (&["--colour", "#ff0000=gold,00ff00=white"], "FoilpressColour", "#ff0000=gold,00ff00=white"),
+            (&["--reserved", "--tolerance", "20"], "FoilpressTolerance", "20"),
+            (&["--reserved"], "FoilpressSpots", "Reserved"),
+            (&["--mirror"], "MirrorPrint", "True"),
+        ] {
+            let (typed, picked) = (typed(words), picked(keyword, value));
+            let of = |c: Choices| (c.gamma, c.place, c.inks_of, c.tolerance, c.mirror);
+            let both = (typed.spots == picked.spots, keyword == "FoilpressTolerance");
+            assert!(both != (false, false), "{words:?}");
+            assert_eq!(of(typed), of(picked), "{words:?}");
+        }
+    }
 }

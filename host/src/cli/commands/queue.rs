@@ -19,7 +19,7 @@ use press::layout::Profile;
 use queue::call::{Call, Exit};
 use queue::install::{self, Places};
 use queue::messages::{Messages, Report as _};
-use queue::options::{self, Choices};
+use queue::options;
 use queue::{backend, filter, listing, ppd, uri};
 
 /// Arguments of `queue`.
@@ -336,7 +336,7 @@ fn filtered(arguments: &[OsString], observer: &dyn Observer) -> Result<usize> {
     };
     // Its defaults are the queue's; without it the program's own apply.
     let description = std::env::var_os("PPD").and_then(|path| std::fs::read_to_string(path).ok());
-    let choices = Choices::read(&options::parse(&asked.to_string_lossy()), description.as_deref())?;
+    let choices = options::read(&options::parse(&asked.to_string_lossy()), description.as_deref())?;
     #[expect(clippy::disallowed_methods, reason = "jobs are bytes, and the print system reads them")]
     let mut out = io::BufWriter::with_capacity(1 << 18, io::stdout());
     let library = Library::builtin();
