@@ -116,8 +116,8 @@ impl Tangent {
         Tangent { points }
     }
 
-    /// The four coordinates in which the mixture's dots differ most, to 1/65536, so that the last bit of a power or a root, which differs
-    /// from machine to machine, changes no dot.
+    /// The four coordinates in which the mixture's dots differ most, to 1/65536, so that the last bit of a power or a root
+    /// changes no dot.
     pub fn leading(&self) -> Vec<[f32; 4]> {
         let round = |value: &f64| ((value * 65536.0).round() / 65536.0) as f32;
         let first = |point: &Vec<f64>| std::array::from_fn(|c| point.get(c).map_or(0.0, round));

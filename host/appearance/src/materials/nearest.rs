@@ -222,7 +222,10 @@ impl<'a> Target<'a> {
         // The slope of cbrt(f c) is c^(1/3) f^(-2/3) / 3.
         let columns = row.iter().zip(space.weight().iter().zip(space.radiance()));
         let weight = columns
-            .map(|(&f, (w, c))| (w * c.cube_root()).squared() * f.max(floor).power(-4.0 / 3.0))
+            .map(|(&f, (w, c))| {
+                let f = f.max(floor);
+                (w * c.cube_root()).squared() / (f * f.cube_root())
+            })
             .collect();
         Target { space, row, weight }
     }
