@@ -9,7 +9,9 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::knots::Knots;
+mod knots;
+
+pub use knots::{KnotPosition, Knots};
 
 /// The most rows in a curve file: far more than any measurement has, few enough for hostile files.
 const MOST_SAMPLES: usize = 65_536;

@@ -9,13 +9,13 @@
 
 pub mod albedo;
 pub mod archive;
+mod cartridges;
 mod combine;
 mod curve;
 mod format;
 pub mod ggx;
 pub mod gloss;
 mod judge;
-mod knots;
 pub mod lab;
 mod library;
 pub mod linalg;
@@ -33,9 +33,8 @@ pub mod set;
 mod stack;
 mod uncertainty;
 
-pub use curve::{Curve, CurveError};
+pub use curve::{Curve, CurveError, KnotPosition, Knots};
 pub use format::{Caution, FILE_NAME};
-pub use knots::{KnotPosition, Knots};
 pub use library::{Cartridge, Dots, Entry, Library, Origins};
 pub use lobes::{Lobe, Lobes};
 pub use open::LibraryError;

@@ -14,7 +14,7 @@ use std::sync::OnceLock;
 use protocol::ink::Ink;
 use serde::{Deserialize, Serialize};
 
-use crate::names;
+use crate::cartridges;
 
 /// The most inks of one's own: more than are sold.
 pub const MOST: usize = 64;
@@ -122,7 +122,7 @@ impl Own {
                 "`{word}` in the name of an ink has another meaning; leave it out, as in neon-pink"
             ));
         }
-        if let Some(ink) = names::cartridge(&name) {
+        if let Some(ink) = cartridges::ink(&name) {
             return Err(format!("`{name}` is a name of {} already; choose another", ink.name()));
         }
         Ok(Own { name, colour: self::colour(colour)?, poses_as })
@@ -152,7 +152,7 @@ pub fn read(text: &str) -> Result<Vec<Own>, String> {
     let file: File = toml::from_str(text).map_err(|error| error.to_string().trim_end().to_owned())?;
     let mut list: Vec<Own> = Vec::new();
     for Row { name, colour, poses_as } in file.ink {
-        let ink = names::cartridge(&poses_as)
+        let ink = cartridges::ink(&poses_as)
             .ok_or_else(|| format!("ink `{name}`: `{poses_as}` is none of the printer's inks"))?;
         add(&mut list, Own::new(&name, &colour, ink)?)?;
     }

@@ -3,7 +3,7 @@
 //! Run `cargo bench --bench send`. `read_the_job` is what any sender has to do before the first byte; the bridge here
 //! takes everything at once, so that only the host is timed.
 
-use device::forms::{Content, check, streams};
+use device::encodings::{Content, check, streams};
 use device::transit::session::{Outcome, Record, Session};
 use divan::Bencher;
 use divan::counter::BytesCount;

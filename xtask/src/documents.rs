@@ -116,6 +116,7 @@ fn packages_of_other_systems_agree_on_version_and_number() {
         ("others/foilpress.spec", format!("Version:        {version}\n")),
         ("others/default.nix", format!("version = \"{version}\"")),
         ("debian/changelog", format!("foilpress ({version}-")),
+        ("../CITATION.cff", format!("version: {version}\n")),
         ("70-foilpress.rules", number.clone()),
         ("71-foilpress-queues.rules", number),
     ] {

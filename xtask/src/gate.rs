@@ -1,12 +1,12 @@
 //! `cargo xtask test`: everything that has to pass before anything lands.
 //!
 //! Problem: everybody waits for it, and whole programs in real time take longer than all else together.
-//! Method: every step runs, whatever failed before, and has its time said. What the tests need is fetched and built beside
-//! the lints, for much of that is waiting; the tests then run together, those on the emulator and in the browser beside the
-//! others. Tests that take real time are marked `#[ignore]` with the reason `real time`: they are built like the
-//! others, and `--full` runs them, too, with the lints for other systems and the Debian package.
-//! At the end stand the seconds of each step, the slowest tests, the tests that were left out because something is missing on
-//! this computer ([`needs`]), and the steps that failed.
+//! Method: every step runs, whatever failed before, and has its time said. What the tests need is fetched and
+//! built beside the lints, for much of that is waiting; the tests then run together, those on the emulator
+//! and in the browser beside the others. Tests that take real time are marked `#[ignore]` with the reason
+//! `real time`: they are built like the others, and `--full` runs them, too, with the lints for other systems
+//! and the Debian package. At the end stand the seconds of each step, the slowest tests, the tests that were
+//! left out because something is missing on this computer ([`needs`]), and the steps that failed.
 
 use std::fs;
 use std::io::ErrorKind;

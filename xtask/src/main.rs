@@ -14,6 +14,7 @@ mod preview;
 mod queue;
 mod release;
 mod runner;
+mod tidy;
 mod tools;
 
 use std::path::{Path, PathBuf};
@@ -31,9 +32,12 @@ struct Args {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Run everything that has to pass before a change lands: format, lints, documents, tests, emulator, browser
+    /// Run everything that has to pass before a change lands: format, lints, documents, tests, emulator,
+    /// browser
     Test {
-        /// Run also what takes real time, print queues, package and the lints for macOS and Windows, documents' commands as they stand, 32 times as many cases of each property, and the whole system under one seed after another: some three hours
+        /// Run also what takes real time, print queues, package and the lints for macOS and Windows,
+        /// documents' commands as they stand, 32 times as many cases of each property, and the whole system
+        /// under one seed after another: some three hours
         #[arg(long)]
         full: bool,
     },
@@ -51,6 +55,13 @@ enum Task {
     Preview,
     /// Test print queues on a private print server; installs CUPS if it is missing (needs root)
     Queue,
+    /// Check the order of modules, folders, lines and numbers against xtask/tidy.list, and dependencies
+    /// against deny.toml; count lines without tests
+    Tidy {
+        /// Write the list anew, where it became shorter
+        #[arg(long)]
+        shrink: bool,
+    },
     /// Build the Debian package, try it in a root of its own and, as root, on this computer
     Package {
         /// Package a build like that of the tests: slower, but ready sooner
@@ -85,10 +96,21 @@ fn main() -> ExitCode {
         Task::Emulator { serve: false } => finish(emulator::alone(root)),
         Task::Preview => finish(preview::run(root)),
         Task::Queue => finish(queue::run(root)),
+        Task::Tidy { shrink } => finish(tidy::run(root, shrink).and_then(|()| deny(root))),
         Task::Package { dev: false } => finish(package::build(root, package::Profile::Release)),
         Task::Package { dev: true } => finish(package::build(root, package::Profile::Dev)),
         Task::Release { dry_run, only } => finish(release::run(root, &only, dry_run)),
     }
+}
+
+/// Checks licences, advisories, bans and sources of dependencies by `deny.toml`.
+fn deny(root: &Path) -> anyhow::Result<()> {
+    let is_there = cargo(&["deny", "--version"]).output().is_ok_and(|output| output.status.success());
+    if !is_there {
+        println!("dependencies are not checked: there is no cargo-deny");
+        return Ok(());
+    }
+    succeed(cargo(&["deny", "check"]).current_dir(root))
 }
 
 fn finish(result: anyhow::Result<()>) -> ExitCode {

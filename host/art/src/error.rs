@@ -145,6 +145,7 @@ fn nothing_fits(diagnosis: Diagnosis) -> Diagnosis {
 
 /// Several pages, counted from 1, hold art, and none was chosen.
 pub(super) fn several_pages(path: &Path, pages: &[u32]) -> Diagnosis {
+    /// Names that a message has room for: some two lines.
     const NAMED: usize = 8;
     let named: Vec<String> = pages.iter().take(NAMED).map(u32::to_string).collect();
     let more = if pages.len() > NAMED { ", …" } else { "" };

@@ -1,7 +1,8 @@
 //! From files and pages in memory to artwork: which file is what, what a name prints, and the size on paper.
 //!
-//! Method: [`open`] chooses the way of a file. Pictures come from the crate `readers`, drawings from [`svg`], pages from [`pdf`];
-//! [`inks_by_name`] says what the planes and colours of a picture print, and [`layered`] and `pdf::plates` what layers and spots do.
+//! Method: [`open`] chooses the way of a file. Pictures come from the crate `readers`, drawings from [`svg`],
+//! pages from [`pdf`]; [`inks_by_name`] says what the planes and colours of a picture print, and [`layered`]
+//! and `pdf::plates` what layers and spots do.
 
 pub(crate) mod coverage;
 pub(crate) mod cut_lines;

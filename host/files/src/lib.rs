@@ -1,8 +1,8 @@
 //! Small files that appear whole or not at all, and settings and descriptions in TOML.
 //!
-//! A file is written beside its final place and renamed, so nobody ever reads half of one. A text is read up to 4 MB, so
-//! a file that is not one of ours cannot fill the memory. [`durable`] is for what has to outlive a crash, [`shelf`] is what readers
-//! of documents see of a disk.
+//! A file is written beside its final place and renamed, so nobody ever reads half of one. A text is read up
+//! to 4 MB, so a file that is not one of ours cannot fill the memory. [`durable`] is for what has to outlive
+//! a crash, [`shelf`] is what readers of documents see of a disk.
 #![deny(unsafe_code)]
 
 pub mod durable;

@@ -1,13 +1,13 @@
 //! Where documents and libraries stand: on disk, or in memory.
 //!
-//! Problem: a document is one file or many, comes from strangers, and may lie on disk, in an archive, or in the memory of
-//! another program. A reader that opens files itself works with the first only, and judges each danger anew.
-//! Method: readers see a [`Shelf`]. It says what stands at a path and opens regular files, nothing else: a pipe or a device, or a
-//! link to one, could block forever. [`Shelf::read`] takes a limit. A name that stands inside a document goes through [`inside`],
-//! which refuses whatever could lead out of the document's folder.
-//! Cost: one virtual call for each file that is opened or read.
-//! Limits: a folder shows at most [`MOST_NAMES`] names. Links on disk are followed, as they are the user's own; [`Memory`] has none.
-//! [`Memory`] refuses `..`, as it has no folder above.
+//! Problem: a document is one file or many, comes from strangers, and may lie on disk, in an archive, or in
+//! the memory of another program. A reader that opens files itself works with the first only, and judges each
+//! danger anew. Method: readers see a [`Shelf`]. It says what stands at a path and opens regular files,
+//! nothing else: a pipe or a device, or a link to one, could block forever. [`Shelf::read`] takes a limit. A
+//! name that stands inside a document goes through [`inside`], which refuses whatever could lead out of the
+//! document's folder. Cost: one virtual call for each file that is opened or read.
+//! Limits: a folder shows at most [`MOST_NAMES`] names. Links on disk are followed, as they are the user's
+//! own; [`Memory`] has none. [`Memory`] refuses `..`, as it has no folder above.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Debug;
@@ -129,8 +129,9 @@ impl Seek for Opened {
     }
 }
 
-/// The path of a file that a document names, in the folder `base` or below. Nothing for a name that could lead out of it: one with `..`, an
-/// absolute one, a drive's letter or a stream's colon, and a backslash, which only some systems take for a separator.
+/// The path of a file that a document names, in the folder `base` or below. Nothing for a name that could
+/// lead out of it: one with `..`, an absolute one, a drive's letter or a stream's colon, and a backslash,
+/// which only some systems take for a separator.
 pub fn inside(base: &Path, name: &str) -> Option<PathBuf> {
     let plain = |part| matches!(part, Component::Normal(_) | Component::CurDir);
     let within =
@@ -200,7 +201,8 @@ impl Memory {
     /// Puts a file at a path, in place of what was there.
     ///
     /// # Errors
-    /// A path with `..`, one that is no file's name, or one at which a folder stands or that leads through a file.
+    /// A path with `..`, one that is no file's name, or one at which a folder stands or that leads through a
+    /// file.
     pub fn insert(&mut self, path: impl AsRef<Path>, bytes: impl Into<Arc<[u8]>>) -> io::Result<()> {
         let path = place(path.as_ref())?;
         if path.file_name().is_none() || self.is_folder(&path) {

@@ -15,6 +15,8 @@ pub(super) enum Axis {
 }
 
 impl Axis {
+    /// What the parts of a dot sum to: a power of two so that division is a shift, fine enough for a pixel
+    /// that covers a thousandth of a dot.
     pub(super) const FULL: u32 = 1 << 12;
 
     pub(super) fn between(dots: usize, pixels: usize) -> Axis {

@@ -17,7 +17,7 @@ use appearance::brdf::{Space, Table};
 use appearance::gamut::InkMix;
 use spectra::{Complex, transform};
 
-/// Dots of a metre.
+/// Dots of a metre: 600 an inch, and 25.4 mm.
 const DOTS: f64 = 600.0 / 0.0254;
 
 /// Luminance of the paper in cd/m2, a dim room.
@@ -116,8 +116,8 @@ impl Tangent {
         Tangent { points }
     }
 
-    /// The four coordinates in which the mixture's dots differ most, to 1/65536, so that the last bit of a power or a root
-    /// changes no dot.
+    /// The four coordinates in which the mixture's dots differ most, to 1/65536, so that the last bit of a
+    /// power or a root changes no dot.
     pub fn leading(&self) -> Vec<[f32; 4]> {
         let round = |value: &f64| ((value * 65536.0).round() / 65536.0) as f32;
         let first = |point: &Vec<f64>| std::array::from_fn(|c| point.get(c).map_or(0.0, round));

@@ -38,17 +38,17 @@ use lines::Lines;
 /// Where a stack lies among all others.
 pub(super) type Point = [f32; 4];
 
-/// Rounds over a part; three more change less than 1 %.
+/// Rounds over a part, as measured: three more change less than 1 %.
 const ROUNDS: usize = 5;
 
 /// How far an error reaches, in dots to each side: less leaves means unseen, and the search makes worse of them.
 const REACH: usize = 47;
 
-/// How far an exchange reaches. Its two errors cancel from afar.
+/// How far an exchange reaches: its two errors cancel from afar, so that beyond it nothing would change.
 const NEAR: usize = 30;
 
-/// How far the halves of a cell are two errors; beyond they are one at its centre. A half of a cell of 4 x 4 is seen there as its centre
-/// is, but for two hundredths of itself.
+/// How far the halves of a cell are two errors; beyond they are one at its centre, for a half of a cell of 4
+/// x 4 is seen there as its centre is, but for two hundredths of itself.
 const CLOSE: usize = 16;
 
 /// The most block rows in a part, and how many at each end belong to its neighbours: more than an error reaches.

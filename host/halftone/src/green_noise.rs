@@ -17,7 +17,7 @@ use std::sync::OnceLock;
 
 use appearance::weights::ONE;
 
-/// Dots after which a table repeats, across and down.
+/// Dots after which a table repeats, across and down, so that a place takes 8 bits.
 pub const SIDE: usize = 256;
 
 /// The minimum cluster whose table is stored: that of the process inks in the built-in library.

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use super::solids::Solids;
 use mix::Lattice;
 
-/// Bands in a strip; the last strip has up to twice as many.
+/// Bands in a strip, enough work for a thread; the last strip has up to twice as many, so that none is short.
 const STRIP: usize = 16;
 
 /// The dots by the rule of the paper.

@@ -73,7 +73,7 @@ pub enum Method {
 /// A dot of the map of fixed dots that is halftoned.
 pub const TONE: u8 = u8::MAX;
 
-/// Half angles at which reflectance is compared.
+/// Half angles at which reflectance is compared, as many as documents have.
 const SAMPLES: usize = 32;
 
 /// Settings of the halftone.

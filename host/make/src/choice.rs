@@ -1,4 +1,5 @@
-//! Names and words of what can be chosen beside the options of a [page](crate::options): for a command line and for reports.
+//! Names and words of what can be chosen beside the options of a [page](crate::options): for a command line
+//! and for reports.
 
 use appearance::document::ColourSpace;
 use appearance::factor::Method;

@@ -1,7 +1,7 @@
 //! Flat art to its print: what the command line, print queues and the print server do alike.
 //!
-//! Method: [`Layers::open`] reads the art for the room that its page has, [`Layers::compose`] makes its dots, and job, plan and pictures are
-//! made of these. Cost and limits: those of [`art`].
+//! Method: [`Layers::open`] reads the art for the room that its page has, [`Layers::compose`] makes its dots,
+//! and job, plan and pictures are made of these. Cost and limits: those of [`art`].
 
 use std::path::PathBuf;
 
@@ -26,7 +26,8 @@ pub struct Settings {
     pub library: Library,
     /// How it lies on the paper.
     pub page: PageSettings,
-    /// How to ask for what would improve the print, in the words of whoever shows the plan; of the inks that may be used.
+    /// How to ask for what would improve the print, in the words of whoever shows the plan; of the inks that
+    /// may be used.
     pub how: fn(&Remedy, &InkSet) -> String,
 }
 

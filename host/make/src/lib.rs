@@ -1,8 +1,9 @@
 //! Foilpress for other programs: documents of materials and flat art to jobs for the printer.
 //!
-//! [`Print`] is a document and [`Layers`] is flat art on its way to a job. [`Print::of`] and [`Layers::of`] go the whole way: settings in,
-//! [`Made`] out, which holds the job, its plan and notes, and draws pictures and pages when they are asked for by name. Nothing is
-//! written or printed; progress goes to an [`Observer`](observe::Observer). The crates of the stages are at hand here by their names.
+//! [`Print`] is a document and [`Layers`] is flat art on its way to a job. [`Print::of`] and [`Layers::of`]
+//! go the whole way: settings in, [`Made`] out, which holds the job, its plan and notes, and draws pictures
+//! and pages when they are asked for by name. Nothing is written or printed; progress goes to an
+//! [`Observer`](observe::Observer). The crates of the stages are at hand here by their names.
 //!
 //! ```
 //! use foilpress::{Print, appearance::document, observe::Silent, print::Settings};

@@ -1,9 +1,10 @@
 //! What was made of a document, of art or of a chart: the job, its plan, and pictures and pages by name.
 //!
 //! Problem: a print is a folder for one user, an answer over the network for another and a value for a third.
-//! Method: the job and its figures are made at once; a picture or a page is drawn when it is asked for, and nothing is written. Names are
-//! those of the files in the folder of `foilpress print`, by which the pages show the pictures.
-//! Cost: a page of pictures takes about as long as the job. Limits: the passes as data are [`press::separate::files`]' to write.
+//! Method: the job and its figures are made at once; a picture or a page is drawn when it is asked for, and
+//! nothing is written. Names are those of the files in the folder of `foilpress print`, by which the pages
+//! show the pictures. Cost: a page of pictures takes about as long as the job. Limits: the passes as data are
+//! [`press::separate::files`]' to write.
 
 use art::Report;
 use observe::Observer;
@@ -78,8 +79,8 @@ impl Made {
         &self.plan().notes
     }
 
-    /// The average difference d of a document and its print for an eye at [`EYE`](press::preview::EYE) metres: 0.01 is barely visible,
-    /// 0.05 obvious.
+    /// The average difference d of a document and its print for an eye at [`EYE`](press::preview::EYE)
+    /// metres: 0.01 is barely visible, 0.05 obvious.
     #[must_use]
     pub fn distance(&self) -> Option<f64> {
         match &self.subject {
@@ -109,8 +110,9 @@ impl Made {
         }
     }
 
-    /// A picture as PNG: `preview.png` (all inks, dot for dot, as the simulated printer printed them), `separation.png` (stacks in false
-    /// colours), `preview-01-cyan.png` (a pass, dot for dot); of a document also `sheet.png` (it and its print under four lights) and
+    /// A picture as PNG: `preview.png` (all inks, dot for dot, as the simulated printer printed them),
+    /// `separation.png` (stacks in false colours), `preview-01-cyan.png` (a pass, dot for dot); of a document
+    /// also `sheet.png` (it and its print under four lights) and
     /// `materials.png` (balls of its materials before and after mapping).
     ///
     /// # Errors
@@ -136,8 +138,9 @@ impl Made {
         }
     }
 
-    /// A page as HTML: `plan.html` (the plan to print and keep beside the printer); of a document also `report.html` (all figures beside the
-    /// pictures, which it shows by their names) and `sheet.html` (the sheet under light that follows the hand).
+    /// A page as HTML: `plan.html` (the plan to print and keep beside the printer); of a document also
+    /// `report.html` (all figures beside the pictures, which it shows by their names) and `sheet.html` (the
+    /// sheet under light that follows the hand).
     ///
     /// # Errors
     /// A name that is none of [`pages`](Self::pages).

@@ -1,11 +1,12 @@
-//! What can be chosen for a page: one table for the command line, the description of a print queue and the print server.
+//! What can be chosen for a page: one table for the command line, the description of a print queue and the
+//! print server.
 //!
-//! Problem: the same wish is typed on a command line, picked in a dialog, and sent as an attribute over the network, and has to mean the same.
-//! Method: [`PAGE`] has a row for each option: its name on each door, its words, and its values. A value has its names on each door and sets
-//! what it means in the [`Choices`]. A door shows the values that have a name there, and looks them up by it; the first that a dialog
-//! shows is the dialog's default.
-//! Limits: what is typed freely (a colour, a length) is read by one function for all doors.
-//! Source: of the attributes, RFC 8011 section 5.2, PWG 5100.3, 5100.7 and 5101.1.
+//! Problem: the same wish is typed on a command line, picked in a dialog, and sent as an attribute over the
+//! network, and has to mean the same. Method: [`PAGE`] has a row for each option: its name on each door, its
+//! words, and its values. A value has its names on each door and sets what it means in the [`Choices`]. A
+//! door shows the values that have a name there, and looks them up by it; the first that a dialog shows is
+//! the dialog's default. Limits: what is typed freely (a colour, a length) is read by one function for all
+//! doors. Source: of the attributes, RFC 8011 section 5.2, PWG 5100.3, 5100.7 and 5101.1.
 
 use std::ops::RangeInclusive;
 
@@ -650,7 +651,8 @@ impl PageOption {
         self.typed().find(|value| value.of(|choices| is(&choices))).map_or("", |value| value.name)
     }
 
-    /// Chooses a value by its keyword in a dialog, or one that was typed there, as `Custom.20x30mm` or `20x30mm`.
+    /// Chooses a value by its keyword in a dialog, or one that was typed there, as `Custom.20x30mm` or
+    /// `20x30mm`.
     #[must_use]
     pub fn choose(&self, text: &str, choices: &mut Choices) -> Option<()> {
         if let Some(value) = self.in_dialog().find(|value| value.dialog.0.eq_ignore_ascii_case(text)) {

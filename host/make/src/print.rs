@@ -1,11 +1,11 @@
 //! A document of materials to its print: dots, job, figures, pictures, pages.
 //!
-//! Problem: commands that print, plan, show and compare a document must not differ in the dots they make of it.
-//! Method: [`Print::new`] halftones the document as the settings say, by [`press::pipeline`]; what else is asked for is made of these
-//! dots. [`Print::made`] makes the job and proves it on the simulated printer while another thread looks at the dots: how far they
-//! are from the document, and how even they are. Pictures and pages are drawn when they are asked for.
-//! Cost: the mixture of a fine document takes the most memory; it is given back as soon as it was measured.
-//! Limits: those of the stages.
+//! Problem: commands that print, plan, show and compare a document must not differ in the dots they make of
+//! it. Method: [`Print::new`] halftones the document as the settings say, by [`press::pipeline`]; what else
+//! is asked for is made of these dots. [`Print::made`] makes the job and proves it on the simulated printer
+//! while another thread looks at the dots: how far they are from the document, and how even they are.
+//! Pictures and pages are drawn when they are asked for. Cost: the mixture of a fine document takes the most
+//! memory; it is given back as soon as it was measured. Limits: those of the stages.
 
 use appearance::brdf::reflectances;
 use appearance::document::Document;
@@ -229,8 +229,8 @@ impl Print {
 
     /// How far print and document are apart for an eye.
     ///
-    /// The document by itself: the simulated page was compared dot for dot with the one laid out from it, and what mirror and printer
-    /// profile do to the page is undone on paper.
+    /// The document by itself: the simulated page was compared dot for dot with the one laid out from it, and
+    /// what mirror and printer profile do to the page is undone on paper.
     fn fidelity(&self, observer: &dyn Observer) -> Result<FidelityReport, Error> {
         let (dots, space) = (&self.halftoned.dots, self.document.materials().space());
         let stacks = reflectances(dots.stacks(), &self.settings.library, space);

@@ -1,8 +1,8 @@
 //! The page that joins what a print of a document writes: `report.html`.
 //!
-//! It lies in the folder of the print and shows the pictures beside it by their names, so each exists once; curves and spectra
-//! are drawn in it. The plan stays a page of its own, `plan.html`, because it is printed and kept beside the printer. Names
-//! come from documents of unknown origin and appear as text.
+//! It lies in the folder of the print and shows the pictures beside it by their names, so each exists once;
+//! curves and spectra are drawn in it. The plan stays a page of its own, `plan.html`, because it is printed
+//! and kept beside the printer. Names come from documents of unknown origin and appear as text.
 
 use maths::Maths;
 use std::fmt::{self, Write as _};

@@ -1,8 +1,8 @@
 //! What is looked at: printed dots, and the document and the mixture of inks that they stand for.
 //!
-//! Problem: `preview` shows documents, jobs and sheets, a print what was just made of a document, and both are the same page.
-//! Cost: bases that make a document look like itself are fitted to it first, which takes longer than its dots; without them the
-//! dots are shown alone.
+//! Problem: `preview` shows documents, jobs and sheets, a print what was just made of a document, and both
+//! are the same page. Cost: bases that make a document look like itself are fitted to it first, which takes
+//! longer than its dots; without them the dots are shown alone.
 
 use std::borrow::Cow;
 
@@ -91,8 +91,9 @@ impl Shown<'_> {
         }
     }
 
-    /// Places on the longer side of a weight map that is fine enough for a sheet of so many pixels. The renderer looks at the dots of a
-    /// print where a pixel has fewer than two, so its map needs no more places than half the dots.
+    /// Places on the longer side of a weight map that is fine enough for a sheet of so many pixels. The
+    /// renderer looks at the dots of a print where a pixel has fewer than two, so its map needs no more
+    /// places than half the dots.
     #[must_use]
     pub fn places(&self, what: Show, pixels: f64) -> usize {
         let most = match what {

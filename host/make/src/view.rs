@@ -22,10 +22,11 @@ const LAMP: ([f64; 2], Option<f64>) = ([-25.0, 30.0], Some(0.6));
 /// How a sheet is looked at. The default is straight from above, half a metre away.
 #[derive(Clone, Debug)]
 pub struct View {
-    /// What to show first or in a picture; the document beside its print on a page, and the print in a picture, if nothing is asked for.
+    /// What to show first or in a picture; the document beside its print on a page, and the print in a
+    /// picture, if nothing is asked for.
     pub show: Option<Show>,
-    /// Lights: azimuth to the right and elevation upwards in degrees, and the distance in metres of one that is near. Without any and
-    /// without a probe there is one.
+    /// Lights: azimuth to the right and elevation upwards in degrees, and the distance in metres of one that
+    /// is near. Without any and without a probe there is one.
     pub lights: Vec<([f64; 2], Option<f64>)>,
     /// Light from everywhere.
     pub probe: Option<Probe>,

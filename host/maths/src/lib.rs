@@ -1,13 +1,14 @@
 //! Mathematics with the same last bit on every machine.
 //!
-//! Problem: a standard sine, logarithm or power is the system's, and systems differ in the last bit of one result in ten.
-//! A dot is a decision between two sums; where one falls the other way, all dots after it do. Of a printed leaf, a
-//! quarter of the dots lay elsewhere.
-//! Method: the functions of the crate `libm`, which is written in Rust and compiled with us, under names of their own, so
-//! that a lint can forbid the standard ones (`clippy.toml`). Whole powers are products in a fixed order; the standard
-//! `powi` promises no order. A square root is right to the last bit everywhere by IEEE 754 and stays the standard one.
-//! Cost: that of the system's, up to twice for powers. Limits: errors are below one unit in the last place, a whole
-//! power's below that of its products.
+//! Problem: a standard sine, logarithm or power is the system's, and systems differ in the last bit of one
+//! result in ten. A dot is a decision between two sums; where one falls the other way, all dots after it do.
+//! Of a printed leaf, a quarter of the dots lay elsewhere.
+//! Method: the functions of the crate `libm`, which is written in Rust and compiled with us, under names of
+//! their own, so that a lint can forbid the standard ones (`clippy.toml`). Whole powers are products in a
+//! fixed order; the standard
+//! `powi` promises no order. A square root is right to the last bit everywhere by IEEE 754 and stays the
+//! standard one. Cost: that of the system's, up to twice for powers. Limits: errors are below one unit in the
+//! last place, a whole power's below that of its products.
 
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the standard mathematics"))]
 
@@ -264,8 +265,8 @@ mod tests {
         0x0b633e8c5a5148a0,
     ];
 
-    /// What every machine has to find, to the last bit; FNV-1a of all results. A version of `libm` that rounds otherwise
-    /// changes jobs, and says so here.
+    /// What every machine has to find, to the last bit; FNV-1a of all results. A version of `libm` that
+    /// rounds otherwise changes jobs, and says so here.
     #[test]
     fn the_last_bits_are_these_everywhere() {
         let digest = |results: &mut dyn Iterator<Item = f64>| {

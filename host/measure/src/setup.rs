@@ -12,9 +12,9 @@ use serde::Deserialize;
 
 use crate::MeasureError;
 
-/// The version of the format.
+/// The version of the format: a number so that a later program can tell.
 const FORMAT: u32 = 1;
-/// The largest setup file in bytes.
+/// The largest setup file in bytes: people write them by hand; few enough for hostile files.
 const MOST_BYTES: u64 = 1 << 20;
 
 /// What the setup file says.

@@ -30,7 +30,7 @@ use super::messages::{Reason, Report};
 use art::process::Process;
 use device::connection::{Address, Destination};
 use device::deliver::{Delivery, Ended, Failure, Job, Packed};
-use device::forms::{self, Checked, Content};
+use device::encodings::{self, Checked, Content};
 use device::printers::{Printer, Printers};
 use device::transit::finish::Sheet;
 use device::transit::journal::{Entry, Journal, OpenJob};
@@ -220,7 +220,7 @@ impl Backend<'_> {
         // All are judged before the first byte leaves.
         let mut checked = Vec::new();
         for index in 0..sheets.count() {
-            checked.push(forms::check(&self.bytes(sheets, index)?, &Silent).map_err(|error| {
+            checked.push(encodings::check(&self.bytes(sheets, index)?, &Silent).map_err(|error| {
                 let text =
                     format!("sheet {} of {}: {}", index + 1, sheets.count(), observe::with_causes(&error));
                 self.fail(Exit::Cancel, &text)

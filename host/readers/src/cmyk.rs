@@ -2,10 +2,10 @@
 //!
 //! Problem: a CMYK picture states how much of four inks to print, not what colour results. Its profile, if it has one,
 //! describes another printer's inks.
-//! Method: each plate becomes a plane. Adobe stores inverted values, where 0 is full ink, and all programs that write such files do the
-//! same. YCCK is the same picture with cyan, magenta and yellow as a luminance and two differences.
-//! Cost: the file in memory, and five bytes a pixel. Limits: baseline and progressive files of 8 bits.
-//! Source: Adobe technical note 5116, section 18; ITU-T T.871 for the transform.
+//! Method: each plate becomes a plane. Adobe stores inverted values, where 0 is full ink, and all programs
+//! that write such files do the same. YCCK is the same picture with cyan, magenta and yellow as a luminance
+//! and two differences. Cost: the file in memory, and five bytes a pixel. Limits: baseline and progressive
+//! files of 8 bits. Source: Adobe technical note 5116, section 18; ITU-T T.871 for the transform.
 
 use std::path::Path;
 

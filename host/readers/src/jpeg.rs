@@ -1,9 +1,9 @@
 //! What the markers of a JPEG file tell: its size, its channels, and whether it is whole.
 //!
 //! Problem: decoders of JPEG fill what is missing at the end of a file with grey, for browsers.
-//! Method: segments have lengths, and are stepped over; within a scan only the end of the picture is FF D9, because scans write FF as
-//! FF 00. A thumbnail, which has an end of its own, lies within a segment. Cost: one pass over the bytes.
-//! Limits: damage within a scan is not seen.
+//! Method: segments have lengths, and are stepped over; within a scan only the end of the picture is FF D9,
+//! because scans write FF as FF 00. A thumbnail, which has an end of its own, lies within a segment. Cost:
+//! one pass over the bytes. Limits: damage within a scan is not seen.
 //! Source: ITU-T T.81, annex B.
 
 /// Whether the file has the marker of its end, outside of the segments with data of their own.

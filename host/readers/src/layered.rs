@@ -1,12 +1,13 @@
 //! OpenRaster and Krita files: a list of layers, and the picture of each.
 //!
 //! Problem: painting programs keep layers that lie anywhere on the canvas, are shown or hidden, and shine through.
-//! Method: an OpenRaster file is a zip archive of a PNG for each layer and a list of them, uppermost first. The list becomes [`Node`]s
-//! from the bottom up, each with what the groups around it make of it; any of them are drawn on the canvas. Krita's own files have layers
-//! in a format of their own; of them only the names are read. Both hold a merged picture.
-//! Cost: four bytes a pixel of the layers that are drawn at once. Limits: the caller's for the canvas and for each layer, four times as
-//! many pixels in all, [`MOST_LAYERS`], entries that are stored or deflated; blend modes and filters are not applied.
-//! Source: the OpenRaster specification 0.0.5, freedesktop.org; `maindoc.xml` of files by Krita.
+//! Method: an OpenRaster file is a zip archive of a PNG for each layer and a list of them, uppermost first.
+//! The list becomes [`Node`]s from the bottom up, each with what the groups around it make of it; any of them
+//! are drawn on the canvas. Krita's own files have layers in a format of their own; of them only the names
+//! are read. Both hold a merged picture. Cost: four bytes a pixel of the layers that are drawn at once.
+//! Limits: the caller's for the canvas and for each layer, four times as many pixels in all, [`MOST_LAYERS`],
+//! entries that are stored or deflated; blend modes and filters are not applied. Source: the OpenRaster
+//! specification 0.0.5, freedesktop.org; `maindoc.xml` of files by Krita.
 
 use std::io::{Cursor, Read as _};
 use std::path::{Path, PathBuf};
@@ -208,8 +209,8 @@ impl Layered {
         Ok(())
     }
 
-    /// Draws layers on the canvas, each with an opacity, from the bottom up: `row` has red, green, blue and opacity of each row. Messages
-    /// call them `what`.
+    /// Draws layers on the canvas, each with an opacity, from the bottom up: `row` has red, green, blue and
+    /// opacity of each row. Messages call them `what`.
     ///
     /// # Errors
     /// A layer that is damaged or too large.

@@ -1,10 +1,10 @@
 //! A picture as its file has it: planes with names, colours, a resolution.
 //!
-//! Problem: layers of ink, plates of a press and photographs come in the same formats. What a plane is for is not the file's to say.
-//! Method: a reader hands over what the file says: named planes, process plates, opacity, and colours as they are stored, the right
-//! way up. [`Picture::to_srgb`] brings the colours to sRGB by the profile or the power that the file states. Cost: what the pixels
-//! take. Limits: 8 bits a sample; deeper samples are rounded, and a note says so.
-//! Source: IEC 61966-2-1 for sRGB.
+//! Problem: layers of ink, plates of a press and photographs come in the same formats. What a plane is for is
+//! not the file's to say. Method: a reader hands over what the file says: named planes, process plates,
+//! opacity, and colours as they are stored, the right way up. [`Picture::to_srgb`] brings the colours to sRGB
+//! by the profile or the power that the file states. Cost: what the pixels take. Limits: 8 bits a sample;
+//! deeper samples are rounded, and a note says so. Source: IEC 61966-2-1 for sRGB.
 
 use std::path::PathBuf;
 
@@ -120,7 +120,8 @@ impl From<image::DynamicImage> for Raster {
 }
 
 impl Picture {
-    /// Brings the colours to sRGB with opacity, by the profile or the power that the file states, and notes what changed them.
+    /// Brings the colours to sRGB with opacity, by the profile or the power that the file states, and notes
+    /// what changed them.
     ///
     /// # Errors
     /// A profile for pixels of another kind.

@@ -1,7 +1,7 @@
 //! Colour profiles: applied to the colours of a picture, and written for a printer.
 //!
-//! Method: those of the International Color Consortium, by the crate `moxcms`, with its usual intent. Cost: some nanoseconds a pixel.
-//! Limits: 8 bits; profiles of grey and of red, green and blue.
+//! Method: those of the International Color Consortium, by the crate `moxcms`, with its usual intent. Cost:
+//! some nanoseconds a pixel. Limits: 8 bits; profiles of grey and of red, green and blue.
 //! Source: ICC.1:2010, 8.3 and 10.10.
 
 use std::io;

@@ -1,11 +1,12 @@
 //! The door to pictures: bytes and a name become a [`Picture`].
 //!
-//! Problem: a picture comes in many formats, each with its own ways to say what it is, and some that no decoder reads. Files are
-//! damaged, cut short or absurdly large.
-//! Method: the first bytes tell the format. PNG, PNM, BMP, GIF and WebP are decoded as they are, of an animation the first picture;
-//! JPEG and TIFF have readers of their own for what decoders refuse or drop. A plane is read as one if it is a process plate or has a
-//! name that the caller asks for. Cost: the pixels, twice where planes are taken apart. Limits: the caller's, checked before anything of
-//! that size is allocated. A damaged colour profile is no reason to refuse a picture.
+//! Problem: a picture comes in many formats, each with its own ways to say what it is, and some that no
+//! decoder reads. Files are damaged, cut short or absurdly large.
+//! Method: the first bytes tell the format. PNG, PNM, BMP, GIF and WebP are decoded as they are, of an
+//! animation the first picture; JPEG and TIFF have readers of their own for what decoders refuse or drop. A
+//! plane is read as one if it is a process plate or has a name that the caller asks for. Cost: the pixels,
+//! twice where planes are taken apart. Limits: the caller's, checked before anything of that size is
+//! allocated. A damaged colour profile is no reason to refuse a picture.
 
 use std::fmt::Display;
 use std::io::{BufRead, ErrorKind, Seek};
@@ -24,8 +25,8 @@ use crate::{Bounds, cmyk, foreign, jpeg, tiff};
 pub struct Request<'a> {
     /// The page of a file with several, from 1; the first if none is chosen.
     pub page: Option<u32>,
-    /// Whether an extra channel of this name is wanted as a plane. Process plates become planes, too. Without it the picture has colours
-    /// only.
+    /// Whether an extra channel of this name is wanted as a plane. Process plates become planes, too. Without
+    /// it the picture has colours only.
     pub planes: Option<&'a dyn Fn(&str) -> bool>,
     /// The most pixels.
     pub pixels: u64,
@@ -165,7 +166,8 @@ pub enum Flaw {
     Damaged,
 }
 
-/// What is wrong with a picture of at most so many pixels, if anything is. Pixels of a kind that is not decoded are no flaw.
+/// What is wrong with a picture of at most so many pixels, if anything is. Pixels of a kind that is not
+/// decoded are no flaw.
 pub fn flaw(bytes: &[u8], pixels: u64) -> Option<Flaw> {
     let format = image::guess_format(bytes).ok()?;
     if format == ImageFormat::Jpeg && !jpeg::is_whole(bytes) {

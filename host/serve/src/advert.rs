@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use mdns_sd::{IfKind, IfPredicate, ServiceDaemon, ServiceInfo};
 
-use crate::printer::{DEVICE_ID, MODEL, URF};
+use crate::printer::{DEVICE_ID, MODEL, URF, title};
 use crate::server::Preset;
 use crate::spool::KINDS;
 
@@ -22,8 +22,6 @@ use crate::spool::KINDS;
 const SUBTYPES: [&str; 2] = ["_print", "_universal"];
 /// The protocol in the clear and encrypted: both at the same port.
 const TYPES: [&str; 2] = ["_ipp", "_ipps"];
-/// The longest name of a service. Source: RFC 6763, section 4.1.1.
-const LONGEST: usize = 63;
 /// The wait for a farewell to be sent.
 const FAREWELL: Duration = Duration::from_secs(2);
 
@@ -41,15 +39,6 @@ pub fn is_real(name: &str) -> bool {
 /// Whether Avahi answers for this computer already.
 pub fn has_avahi() -> bool {
     Path::new("/run/avahi-daemon/socket").exists()
-}
-
-/// How a printer is called in dialogs, on a computer of this name.
-pub fn title(preset: &str, computer: &str) -> String {
-    let mut title = format!("ALPS {preset} @ {computer}");
-    while title.len() > LONGEST {
-        title.pop();
-    }
-    title
 }
 
 /// The keys of a printer's advertisement.
@@ -156,10 +145,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_fits_and_ways_into_this_computer_are_left_out() {
-        assert_eq!(title("decal", "workshop"), "ALPS decal @ workshop");
-        let long = title(&"ä".repeat(60), "workshop");
-        assert!(long.len() <= LONGEST && long.starts_with("ALPS ä"), "{long}");
+    fn ways_into_this_computer_are_left_out() {
         for name in ["eth0", "enp3s0", "wlan0", "en0", "br0", "Ethernet 2"] {
             assert!(is_real(name), "{name}");
         }

@@ -19,15 +19,15 @@ use hyper::{Response, StatusCode};
 use observe::{Silent, with_causes};
 use serde_json::{Value, json};
 
+use crate::body::{Gone, Limits, keep, plain, words};
 use crate::charts::{self, CHARTS};
-use crate::http::{Gone, Limits, keep, plain, words};
 use crate::jobs::{Job, Owner, State};
 use crate::operations;
-use crate::server::{ChangeError, Data, Loaded, Server};
+use crate::server::{ChangeError, Data, Server};
 use crate::spool::{Kind, Packing, Spool, SpoolError};
-use crate::template::{AUTO, SHEETS, Ticket, keyword_of, size_of};
+use crate::template::{AUTO, Loaded, SHEETS, Ticket, keyword_of, size_of};
 use crate::worker;
-use device::forms;
+use device::encodings;
 use device::ledger::{Ledger, totals};
 use make::options::of_attribute;
 use press::preview::inks::{Ground, sheet_in_inks};
@@ -201,7 +201,7 @@ fn plan(server: &Server, id: u32) -> Result<Value, String> {
     worker::prepare(server, id)?;
     let sheets = worker::Folder::of(&server.store.sheets(id));
     let bytes = queue::backend::Sheets::sheet(&sheets, 0).map_err(|error| error.to_string())?;
-    let checked = forms::check(&bytes, &Silent).map_err(|error| with_causes(&error))?;
+    let checked = encodings::check(&bytes, &Silent).map_err(|error| with_causes(&error))?;
     let printout = print(&bytes, &Setup::default(), &Silent).map_err(|error| with_causes(&error))?;
     let printed = printout.sheet().map_err(|error| with_causes(&error))?;
     let area = sheet::Area { left: 0, top: 0, width: printed.width(), length: printed.length() };

@@ -13,14 +13,12 @@ use std::io;
 use std::net::{IpAddr, SocketAddr};
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use bytes::Bytes;
-use http_body_util::{BodyExt as _, Full};
+use http_body_util::Full;
 use hyper::body::Incoming;
-use hyper::header::{
-    CONNECTION, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HOST, HeaderName, HeaderValue, ORIGIN, UPGRADE,
-};
+use hyper::header::{CONNECTION, CONTENT_TYPE, HOST, HeaderName, HeaderValue, ORIGIN, UPGRADE};
 use hyper::service::service_fn;
 use hyper::upgrade::OnUpgrade;
 use hyper::{Method, Request, Response, StatusCode};
@@ -32,46 +30,13 @@ use tokio::time::timeout;
 use tokio_rustls::TlsAcceptor;
 
 use crate::access::{self, Asked};
+use crate::body::{Gone, Limits, drain, keep, piece, plain, words};
 use crate::desk;
-use crate::operations::{self, Place};
+use crate::operations;
 use crate::server::Server;
-use crate::spool::{Kind, Packing, Spool, SpoolError};
 use crate::tls::{self, HANDSHAKE};
 use crate::values::now;
-use crate::wire;
-
-/// What clients may take.
-#[derive(Clone, Copy, Debug)]
-pub struct Limits {
-    /// Connections at once.
-    pub connections: usize,
-    /// Connections of one computer at once.
-    pub of_one: usize,
-    /// Time for the head of a request; also the longest rest between two requests.
-    pub head: Duration,
-    /// Time for each piece of a body.
-    pub piece: Duration,
-    /// Time for a body beside what its bytes take at [`Limits::pace`].
-    pub body: Duration,
-    /// The least pace of a body in bytes a second.
-    pub pace: u64,
-    /// Bytes of a document.
-    pub document: u64,
-}
-
-impl Default for Limits {
-    fn default() -> Limits {
-        Limits {
-            connections: 256,
-            of_one: 128,
-            head: Duration::from_secs(15),
-            piece: Duration::from_secs(30),
-            body: Duration::from_secs(60),
-            pace: 1024,
-            document: queue::filter::LARGEST,
-        }
-    }
-}
+use crate::wire::{self, Place};
 
 /// The header in which a page says the code.
 const CODE: HeaderName = HeaderName::from_static("x-foilpress-code");
@@ -247,35 +212,6 @@ async fn changed_over(house: House, upgrade: OnUpgrade, peer: SocketAddr, guest:
     }
 }
 
-/// An answer of this type.
-pub fn plain(status: StatusCode, kind: &'static str, body: impl Into<Bytes>) -> Response<Full<Bytes>> {
-    let mut response = Response::new(Full::new(body.into()));
-    *response.status_mut() = status;
-    let headers = response.headers_mut();
-    headers.insert(CONTENT_TYPE, HeaderValue::from_static(kind));
-    for (name, value) in [
-        ("x-content-type-options", "nosniff"),
-        ("x-frame-options", "DENY"),
-        ("referrer-policy", "no-referrer"),
-        ("cache-control", "no-store"),
-    ] {
-        headers.insert(HeaderName::from_static(name), HeaderValue::from_static(value));
-    }
-    headers.insert(
-        CONTENT_SECURITY_POLICY,
-        HeaderValue::from_static(
-            "default-src 'none'; img-src 'self' data: blob:; style-src 'self'; script-src 'self'; connect-src 'self'; \
-             frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
-        ),
-    );
-    response
-}
-
-/// An answer in words.
-pub fn words(status: StatusCode, text: &str) -> Response<Full<Bytes>> {
-    plain(status, "text/plain; charset=utf-8", format!("{text}\n"))
-}
-
 async fn respond(
     server: &Server,
     request: Request<Incoming>,
@@ -313,61 +249,6 @@ async fn respond(
         }
         _ => words(StatusCode::METHOD_NOT_ALLOWED, "there is no such thing to do"),
     }
-}
-
-/// The next piece of a body; `None` at its end.
-///
-/// # Errors
-/// It does not come in time, or the client is gone.
-pub async fn piece(body: &mut Incoming, limits: &Limits) -> Result<Option<Bytes>, Gone> {
-    loop {
-        match timeout(limits.piece, body.frame()).await {
-            Err(_) | Ok(Some(Err(_))) => return Err(Gone),
-            Ok(None) => return Ok(None),
-            Ok(Some(Ok(frame))) => match frame.into_data() {
-                Ok(data) if data.is_empty() => {}
-                Ok(data) => return Ok(Some(data)),
-                // Trailers are not for us.
-                Err(_) => {}
-            },
-        }
-    }
-}
-
-/// The client is too slow, or gone.
-#[derive(Clone, Copy, Debug)]
-pub struct Gone;
-
-/// A document on its way to disk.
-///
-/// # Errors
-/// The client is too slow, or gone.
-pub async fn keep(
-    body: &mut Incoming,
-    first: &[u8],
-    folder: &std::path::Path,
-    packing: Packing,
-    limits: &Limits,
-) -> Result<Result<(std::path::PathBuf, Kind, u64), SpoolError>, Gone> {
-    let start = Instant::now();
-    let mut spool = match block_in_place(|| Spool::begin(folder, packing, limits.document)) {
-        Ok(spool) => spool,
-        Err(error) => return Ok(Err(error)),
-    };
-    let mut came = first.len() as u64;
-    if let Err(error) = block_in_place(|| spool.take(first)) {
-        return Ok(Err(error));
-    }
-    while let Some(bytes) = piece(body, limits).await? {
-        came += bytes.len() as u64;
-        if start.elapsed() > limits.body + Duration::from_secs(came / limits.pace) {
-            return Err(Gone);
-        }
-        if let Err(error) = block_in_place(|| spool.take(&bytes)) {
-            return Ok(Err(error));
-        }
-    }
-    Ok(block_in_place(|| spool.end()))
 }
 
 /// An IPP request.
@@ -423,16 +304,4 @@ async fn ipp(server: &Server, mut body: Incoming, place: &Place, limits: &Limits
     }
     let response = block_in_place(|| operations::arrived(server, place, &request, &incoming, spooled));
     plain(StatusCode::OK, IPP, response.bytes())
-}
-
-/// Reads on for a while: a client that is still sending would not see its answer.
-async fn drain(body: &mut Incoming, limits: &Limits) {
-    const MOST: usize = 4 << 20;
-    let mut read = 0;
-    while let Ok(Some(bytes)) = piece(body, limits).await {
-        read += bytes.len();
-        if read > MOST {
-            return;
-        }
-    }
 }

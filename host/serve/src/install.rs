@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 
 use files::durable::{self, Access};
 
-use crate::advert::{keys, title};
+use crate::advert::keys;
+use crate::printer::title;
 use crate::server::Preset;
 
 /// The name of the unit.

@@ -13,6 +13,7 @@
 
 pub mod access;
 pub mod advert;
+pub mod body;
 pub mod charts;
 pub mod desk;
 pub mod http;

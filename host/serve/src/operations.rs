@@ -9,7 +9,6 @@
 
 mod about;
 
-use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 
 use ipp::model::{DelimiterTag, Operation, StatusCode};
@@ -23,58 +22,7 @@ use crate::server::{ChangeError, Preset, Server};
 use crate::spool::{KINDS, Kind, Packing, SpoolError};
 use crate::template::Ticket;
 use crate::values::{each, keyword, now, read_text};
-use crate::wire::{Request, Response};
-
-/// The operations there are.
-pub const OPERATIONS: [Operation; 14] = [
-    Operation::PrintJob,
-    Operation::ValidateJob,
-    Operation::CreateJob,
-    Operation::SendDocument,
-    Operation::CancelJob,
-    Operation::GetJobAttributes,
-    Operation::GetJobs,
-    Operation::GetPrinterAttributes,
-    Operation::HoldJob,
-    Operation::ReleaseJob,
-    Operation::CancelJobs,
-    Operation::CancelMyJobs,
-    Operation::CloseJob,
-    Operation::IdentifyPrinter,
-];
-
-/// Where a request came in.
-#[derive(Clone, Debug)]
-pub struct Place {
-    /// The host and port the client has called, for the addresses in answers.
-    pub host: String,
-    /// Whether the connection is encrypted.
-    pub is_encrypted: bool,
-    /// The printer's name in the path; empty for none.
-    pub printer: String,
-    /// Where the client is.
-    pub from: IpAddr,
-    /// Whether it may change jobs of others.
-    pub may_change: bool,
-}
-
-impl Place {
-    /// The address of a printer.
-    pub fn printer(&self, name: &str) -> String {
-        self.as_scheme(if self.is_encrypted { "ipps" } else { "ipp" }, name)
-    }
-
-    /// The same with or without encryption.
-    pub fn as_scheme(&self, scheme: &str, name: &str) -> String {
-        format!("{scheme}://{}/ipp/print/{name}", self.host)
-    }
-
-    /// The address of a page.
-    pub fn page(&self, path: &str) -> String {
-        let scheme = if self.is_encrypted { "https" } else { "http" };
-        format!("{scheme}://{}/{path}", self.host)
-    }
-}
+use crate::wire::{OPERATIONS, Place, Request, Response};
 
 /// What is to be done with the document behind a request.
 pub struct Incoming {

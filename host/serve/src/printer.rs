@@ -8,8 +8,6 @@
 
 use ipp::value::IppValue;
 
-use crate::advert::title;
-use crate::operations::{OPERATIONS, Place};
 use crate::server::{Cartridge, Preset, Server, identity};
 use crate::spool::KINDS;
 use crate::template::{
@@ -20,6 +18,7 @@ use crate::values::{
     charset, collection, date_time, dpi, integer, keyword, keywords, language, list, long_text, mime, name,
     octets, range, text, unknown, uri,
 };
+use crate::wire::{OPERATIONS, Place};
 use queue::messages::Reason;
 
 /// The type of printer in its names.
@@ -28,9 +27,20 @@ pub const MODEL: &str = "ALPS MD-5500 (Foilpress)";
 pub const DEVICE_ID: &str = "MFG:ALPS;MDL:MD-5500;CMD:PDF,PWGRaster,AppleRaster,URF,JPEG,PNG;CLS:PRINTER;";
 /// What phones are told of Apple raster: one copy, sRGB and grey, 300 and 600 dpi, media type by itself, version 1.4.
 pub const URF: [&str; 7] = ["V1.4", "CP1", "W8", "SRGB24", "DM1", "RS300-600", "MT1-2-3"];
+/// The longest name of a service. Source: RFC 6763, section 4.1.1.
+const LONGEST: usize = 63;
 
 /// An attribute with its group.
 pub type Attribute = (&'static str, &'static str, IppValue);
+
+/// How a printer is called in dialogs, on a computer of this name.
+pub fn title(preset: &str, computer: &str) -> String {
+    let mut title = format!("ALPS {preset} @ {computer}");
+    while title.len() > LONGEST {
+        title.pop();
+    }
+    title
+}
 
 fn media_size((width, length): Size) -> IppValue {
     collection([("x-dimension", integer(width)), ("y-dimension", integer(length))])
@@ -336,3 +346,15 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
 
 /// Seconds until the document of a job has to begin to come, from the last operation of that job.
 pub const TIME_OUT: i32 = 120;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_fits() {
+        assert_eq!(title("decal", "workshop"), "ALPS decal @ workshop");
+        let long = title(&"ä".repeat(60), "workshop");
+        assert!(long.len() <= LONGEST && long.starts_with("ALPS ä"), "{long}");
+    }
+}

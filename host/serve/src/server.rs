@@ -10,10 +10,10 @@ use std::path::{Path, PathBuf};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-pub use self::data::{Cartridge, Data, Loaded, identities, identity};
+pub use self::data::{Cartridge, Data, identities, identity};
 use self::data::{Kept, keep, kept};
 use crate::jobs::{Job, Owner, State, Store, StoreError, after_restart};
-use crate::template::{Ticket, paper, supported};
+use crate::template::{Loaded, Ticket, paper, supported};
 use crate::values::now;
 use device::connection::Destination;
 use device::printers::Printers;

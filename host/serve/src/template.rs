@@ -12,7 +12,6 @@ use ipp::value::IppValue;
 use protocol::paper::Paper;
 use serde::{Deserialize, Serialize};
 
-use crate::server::Loaded;
 use crate::values::{each, read_text};
 use make::options::{Choices, of_attribute};
 use press::layout::paper::{custom_margins, custom_range, sheet_mm, table};
@@ -33,7 +32,8 @@ pub const AUTO: &str = "auto";
 
 /// `print-quality`: drafts are drawn at half the resolution, the best halftone searches.
 pub const QUALITIES: [i32; 3] = [3, 4, 5];
-/// What each attribute of a keyword may also be, which leaves the preset as it is; first those of the preset, then what the table has.
+/// What each attribute of a keyword may also be, which leaves the preset as it is; first those of the preset,
+/// then what the table has.
 const OWN: [(&str, &[&str]); 4] = [
     ("print-content-optimize", &[AUTO]),
     ("print-rendering-intent", &[AUTO]),
@@ -66,6 +66,15 @@ pub const OVERRIDES: [&str; 2] = ["document-number", "pages"];
 
 /// Width and length of a sheet in hundredths of a millimetre, as IPP counts.
 pub type Size = (i32, i32);
+
+/// The sheet that is in the printer, as somebody has said.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct Loaded {
+    /// Its size.
+    pub size: Size,
+    /// What it is made of; [`AUTO`] for what the preset says.
+    pub kind: String,
+}
 
 fn hundredths(mm: f64) -> i32 {
     // Sheets are less than half a metre.
@@ -171,7 +180,8 @@ impl Default for Ticket {
 }
 
 impl Ticket {
-    /// Takes an attribute whose values are words, or an enum whose number is written as one; false if it or its value is not possible here.
+    /// Takes an attribute whose values are words, or an enum whose number is written as one; false if it or
+    /// its value is not possible here.
     pub fn ask(&mut self, attribute: &str, word: &str) -> bool {
         if attribute == "print-quality" {
             let found = word.parse().ok().filter(|quality| QUALITIES.contains(quality));

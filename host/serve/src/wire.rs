@@ -9,9 +9,10 @@
 //! Source: RFC 8010, section 3; RFC 8011, section 4.1.
 
 use std::io::Cursor;
+use std::net::IpAddr;
 
 use ipp::attribute::{IppAttribute, IppAttributes};
-use ipp::model::{DelimiterTag, IppVersion, StatusCode};
+use ipp::model::{DelimiterTag, IppVersion, Operation, StatusCode};
 use ipp::parser::IppParser;
 use ipp::prelude::IppHeader;
 use ipp::reader::IppReader;
@@ -27,6 +28,57 @@ const DEEPEST: usize = 8;
 const MOST_VALUES: usize = 4096;
 /// Version, operation and number of a request.
 const HEADER: usize = 8;
+
+/// The operations there are.
+pub const OPERATIONS: [Operation; 14] = [
+    Operation::PrintJob,
+    Operation::ValidateJob,
+    Operation::CreateJob,
+    Operation::SendDocument,
+    Operation::CancelJob,
+    Operation::GetJobAttributes,
+    Operation::GetJobs,
+    Operation::GetPrinterAttributes,
+    Operation::HoldJob,
+    Operation::ReleaseJob,
+    Operation::CancelJobs,
+    Operation::CancelMyJobs,
+    Operation::CloseJob,
+    Operation::IdentifyPrinter,
+];
+
+/// Where a request came in.
+#[derive(Clone, Debug)]
+pub struct Place {
+    /// The host and port the client has called, for the addresses in answers.
+    pub host: String,
+    /// Whether the connection is encrypted.
+    pub is_encrypted: bool,
+    /// The printer's name in the path; empty for none.
+    pub printer: String,
+    /// Where the client is.
+    pub from: IpAddr,
+    /// Whether it may change jobs of others.
+    pub may_change: bool,
+}
+
+impl Place {
+    /// The address of a printer.
+    pub fn printer(&self, name: &str) -> String {
+        self.as_scheme(if self.is_encrypted { "ipps" } else { "ipp" }, name)
+    }
+
+    /// The same with or without encryption.
+    pub fn as_scheme(&self, scheme: &str, name: &str) -> String {
+        format!("{scheme}://{}/ipp/print/{name}", self.host)
+    }
+
+    /// The address of a page.
+    pub fn page(&self, path: &str) -> String {
+        let scheme = if self.is_encrypted { "https" } else { "http" };
+        format!("{scheme}://{}/{path}", self.host)
+    }
+}
 
 /// Bytes that are no IPP request.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]

@@ -183,8 +183,8 @@ impl Sheet {
         write_toml(&folder.join(SHEET.text), &text)
     }
 
-    /// An area of the sheet in false colours as PNG, one colour for each stack, a pixel a dot. The sheet has `dpi` dots per inch
-    /// across and along.
+    /// An area of the sheet in false colours as PNG, one colour for each stack, a pixel a dot. The sheet has
+    /// `dpi` dots per inch across and along.
     ///
     /// # Errors
     /// None is known: the data is of the picture's size.

@@ -1,4 +1,4 @@
-//! Curves split into a clear coat and what lies below it.
+//! Curves split into a clear coat and what lies below it, and the texels that stand for them.
 //!
 //! Problem: a stack under finish has two lobes, and other programs know a second lobe only as a clear coat.
 //! Method: for each of some widths of a coat and parts of it, the coat's lobe is taken from the curve and what remains is fitted as a
@@ -8,10 +8,12 @@
 //! Source: KHR_materials_clearcoat; light passes the coat twice, as in `appearance::materials::Coat`.
 
 use appearance::brdf::Space;
-use appearance::materials::{DIELECTRIC, Widths};
+use appearance::materials::{DIELECTRIC, Metallic, Widths};
+use appearance::srgb;
 use rayon::prelude::*;
 
-use crate::glb::distance;
+/// The least roughness: its square is the narrowest lobe that a document may have.
+pub(crate) const SMOOTHEST: u8 = 37;
 
 /// The roughness of coats that are tried, of 255: from the smoothest texel on.
 const LEVELS: [u8; 10] = [37, 44, 52, 60, 70, 82, 96, 112, 132, 160];
@@ -24,6 +26,17 @@ const SEEN: f64 = 0.01;
 
 /// The share of that distance that a coat leaves at most.
 const BETTER: f64 = 0.5;
+
+/// A texel: base colour in sRGB, metalness, roughness.
+#[derive(Clone, Copy)]
+pub(crate) struct Texel {
+    pub base: [u8; 3],
+    pub metallic: u8,
+    pub roughness: u8,
+    /// How much of it the coat covers.
+    pub coat: u8,
+    pub distance: f64,
+}
 
 /// The coat of a sheet.
 pub(crate) struct Coating {
@@ -88,4 +101,33 @@ impl Coating {
         let each = row.iter().zip(&self.lobe);
         each.map(|(f, lobe)| ((f - part * lobe) / through(part)).max(0.0)).collect()
     }
+}
+
+/// How far the nearest texel without a coat is from a row, rounded to eight bits.
+fn distance(widths: &Widths<'_>, space: &Space, row: &[f64]) -> f64 {
+    texel(widths, space, row, None).distance
+}
+
+/// The texel nearest to a row, below a coat that covers a part of it.
+pub(crate) fn texel(widths: &Widths<'_>, space: &Space, row: &[f64], coat: Option<(&Coating, f64)>) -> Texel {
+    let part = coat.map_or(0.0, |(_, part)| part.clamp(0.0, 1.0));
+    let code = (255.0 * part).round() as u8;
+    let part = f64::from(code) / 255.0;
+    let below = coat.map_or_else(|| row.to_vec(), |(coating, _)| coating.below(row, part));
+    let Some(near) = widths.nearest(&below) else {
+        return Texel { base: [0; 3], metallic: 0, roughness: u8::MAX, coat: 0, distance: f64::INFINITY };
+    };
+    let Metallic { base, metallic } = near.metallic();
+    let base = base.map(|b| (srgb::encode(b as f32) * 255.0).round() as u8);
+    let metallic = (metallic * 255.0).round() as u8;
+    let read = Metallic {
+        base: base.map(|b| f64::from(srgb::decode(f32::from(b) / 255.0))),
+        metallic: f64::from(metallic) / 255.0,
+    };
+    let mut found = widths.row(&near.with(&read));
+    if let Some((coating, _)) = coat {
+        found.iter_mut().zip(&coating.lobe).for_each(|(f, lobe)| *f = through(part) * *f + part * lobe);
+    }
+    let distance = space.distance(row, &found);
+    Texel { base, metallic, roughness: SMOOTHEST + near.width as u8, coat: code, distance }
 }

@@ -11,18 +11,14 @@
 //! Source: glTF 2.0, sections 3.6, 3.7, 3.9 and 4.4; KHR_materials_clearcoat.
 
 use appearance::brdf::Space;
-use appearance::materials::{Metallic, Widths};
-use appearance::srgb;
+use appearance::materials::Widths;
 use observe::Observer;
 use rayon::prelude::*;
 use serde_json::json;
 
-use crate::coat::{Coating, through};
+use crate::coat::{Coating, SMOOTHEST, Texel, texel};
 use crate::error::ViewError;
 use crate::lit::Lit;
-
-/// The least roughness: its square is the narrowest lobe that a document may have.
-const SMOOTHEST: u8 = 37;
 
 /// The file, and how true it is.
 #[derive(Clone, Debug)]
@@ -35,17 +31,6 @@ pub struct Glb {
     pub distance: f64,
     /// The largest distance of a texel.
     pub worst: f64,
-}
-
-/// A texel: base colour in sRGB, metalness, roughness.
-#[derive(Clone, Copy)]
-struct Texel {
-    base: [u8; 3],
-    metallic: u8,
-    roughness: u8,
-    /// How much of it the coat covers.
-    coat: u8,
-    distance: f64,
 }
 
 /// Writes what is lit as a binary glTF file. `space` is that of the curves.
@@ -98,35 +83,6 @@ pub fn glb(lit: &Lit, space: &Space, name: &str, observer: &dyn Observer) -> Res
     let bytes = packed(lit.size, name, [texture(&|texel| texel.base)?, surfaces], coat)?;
     let distance = (square / texels.len().max(1) as f64).sqrt();
     Ok(Glb { bytes, texels: [level.width, level.height], distance, worst })
-}
-
-/// How far the nearest texel without a coat is from a row, rounded to eight bits.
-pub(crate) fn distance(widths: &Widths<'_>, space: &Space, row: &[f64]) -> f64 {
-    texel(widths, space, row, None).distance
-}
-
-/// The texel nearest to a row, below a coat that covers a part of it.
-fn texel(widths: &Widths<'_>, space: &Space, row: &[f64], coat: Option<(&Coating, f64)>) -> Texel {
-    let part = coat.map_or(0.0, |(_, part)| part.clamp(0.0, 1.0));
-    let code = (255.0 * part).round() as u8;
-    let part = f64::from(code) / 255.0;
-    let below = coat.map_or_else(|| row.to_vec(), |(coating, _)| coating.below(row, part));
-    let Some(near) = widths.nearest(&below) else {
-        return Texel { base: [0; 3], metallic: 0, roughness: u8::MAX, coat: 0, distance: f64::INFINITY };
-    };
-    let Metallic { base, metallic } = near.metallic();
-    let base = base.map(|b| (srgb::encode(b as f32) * 255.0).round() as u8);
-    let metallic = (metallic * 255.0).round() as u8;
-    let read = Metallic {
-        base: base.map(|b| f64::from(srgb::decode(f32::from(b) / 255.0))),
-        metallic: f64::from(metallic) / 255.0,
-    };
-    let mut found = widths.row(&near.with(&read));
-    if let Some((coating, _)) = coat {
-        found.iter_mut().zip(&coating.lobe).for_each(|(f, lobe)| *f = through(part) * *f + part * lobe);
-    }
-    let distance = space.distance(row, &found);
-    Texel { base, metallic, roughness: SMOOTHEST + near.width as u8, coat: code, distance }
 }
 
 /// A rectangle around the origin that faces +z, in metres, with these textures.
@@ -307,7 +263,8 @@ mod tests {
             // Over a matt body one lobe does as well; over a metal it is another material.
             let alphas: Vec<f64> =
                 (SMOOTHEST..=u8::MAX).map(|level| (f64::from(level) / 255.0).powi(2)).collect();
-            let alone = super::distance(&Widths::new(&space, &alphas), &space, factored.bases.row(k));
+            let widths = Widths::new(&space, &alphas);
+            let alone = texel(&widths, &space, factored.bases.row(k), None).distance;
             assert!(k < 2 || off < 0.5 * alone, "{k}: {off}, {alone}");
         }
     }

@@ -1,10 +1,10 @@
 //! Digests of what every machine has to find: functions of `maths`, and the dots of a sample.
 //!
 //! Problem: that a result is equal on any machine is seen only where two machines find it.
-//! Method: the same functions are compiled for this machine and for WebAssembly, which Node runs: another processor, another
-//! library of mathematics, another allocator, no threads. All find the same digests.
-//! Cost: the stages are compiled once more. Limits: documents of files are compared by `host/tests/it/equal.rs` with stored
-//! digests.
+//! Method: the same functions are compiled for this machine and for WebAssembly, which Node runs: another
+//! processor, another library of mathematics, another allocator, no threads. All find the same digests.
+//! Cost: the stages are compiled once more. Limits: documents of files are compared by
+//! `host/tests/it/equal.rs` with stored digests.
 
 use std::borrow::Cow;
 use std::cell::RefCell;

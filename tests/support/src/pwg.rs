@@ -131,8 +131,8 @@ fn packed(kind: Kind, pixels: Vec<Vec<u8>>) -> Vec<u8> {
     row
 }
 
-/// Writes the samples that `ipp-everywhere.test` asks for at these resolutions into a folder, under its names. Returns their
-/// number.
+/// Writes the samples that `ipp-everywhere.test` asks for at these resolutions into a folder, under its
+/// names. Returns their number.
 pub fn samples(folder: &std::path::Path, resolutions: &[u32]) -> usize {
     let mut count = 0;
     // Two tenths of an inch of each colour across the page, an inch below its top.

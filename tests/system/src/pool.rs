@@ -1,7 +1,7 @@
 //! Jobs to send, made once: to check and to code one takes longer than to print it in this world.
 
 use device::deliver::{Job, Packed};
-use device::forms::{self, Checked, Content};
+use device::encodings::{self, Checked, Content};
 use model::{Planes, seeded};
 use observe::Silent;
 use std::sync::LazyLock;
@@ -19,7 +19,7 @@ pub struct Prepared {
 static JOBS: LazyLock<Vec<Prepared>> = LazyLock::new(|| {
     let prepare = |seed| {
         let bytes = Planes::random(&mut seeded(seed)).printed();
-        let checked = forms::check(&bytes, &Silent).ok()?;
+        let checked = encodings::check(&bytes, &Silent).ok()?;
         (bytes.len() < 12_000).then_some(Prepared { bytes, checked })
     };
     (0..).filter_map(prepare).take(SIZE).collect()

@@ -2,12 +2,13 @@
 //! [everything is tried](testing::is_full).
 //!
 //! Small is a third of every length on paper and of every picture's side, and 300 pixels for a preview; each word of a
-//! command is there, in its order. What prints a document or art is asked for its plan instead ([`planned`]): the same words
-//! decide the same dots, and pictures and pages of a print are what other tests look at. What a later command would have of
-//! such a print is then not there, and the command has to say so; that its words are wrong it would say first.
-//! A document's commands run in order, in a copy of the folders that it speaks of, so that later lines find what earlier
-//! ones made. What goes to a bridge goes to one that this test serves: only the address is another. [`ELSEWHERE`] names the
-//! commands that need more than that, and who runs them.
+//! command is there, in its order. What prints a document or art is asked for its plan instead ([`planned`]):
+//! the same words decide the same dots, and pictures and pages of a print are what other tests look at. What
+//! a later command would have of such a print is then not there, and the command has to say so; that its
+//! words are wrong it would say first. A document's commands run in order, in a copy of the folders that it
+//! speaks of, so that later lines find what earlier ones made. What goes to a bridge goes to one that this
+//! test serves: only the address is another. [`ELSEWHERE`] names the commands that need more than that, and
+//! who runs them.
 
 use std::fs;
 use std::io::Write as _;
@@ -137,8 +138,8 @@ fn scaled(command: &str, option: &str) -> String {
     format!("{before}{option}{}{unit}{after}", numbers.collect::<Vec<_>>().join("x"))
 }
 
-/// What becomes of a print that is only planned: the command, and the files and folders that it does not make. `None` for
-/// everything that is no print.
+/// What becomes of a print that is only planned: the command, and the files and folders that it does not
+/// make. `None` for everything that is no print.
 fn planned(command: &str) -> Option<(String, Vec<String>)> {
     let mut words = command.split(' ');
     let (mut plan, mut unmade) = match (words.next()?, words.next()?) {
@@ -262,8 +263,8 @@ impl Desk {
         command
     }
 
-    /// Runs a command in this folder; what it said if it failed. `is_whole`: what it reads is there, or it has to fail for
-    /// that and for nothing in its words.
+    /// Runs a command in this folder; what it said if it failed. `is_whole`: what it reads is there, or it
+    /// has to fail for that and for nothing in its words.
     fn run(&self, command: &str, folder: &Path, is_whole: bool) -> Result<(), String> {
         let path = std::env::var("PATH").unwrap_or_default();
         let mut child = Command::new("sh")

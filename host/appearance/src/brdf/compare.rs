@@ -13,11 +13,12 @@ use serde::Serialize;
 
 use super::space::Space;
 
-/// Standard deviations that are still no difference.
+/// Standard deviations that are still no difference: two of them hold 95 % of a normal distribution's values.
 const BAND: f64 = 2.0;
-/// The share of samples that has to lie within.
+/// The share of samples that has to lie within, as the band of two deviations would have it: 95 %.
 const AGREE: f64 = 0.95;
-/// The largest half angle in degrees whose ratio is reported.
+/// The largest half angle in degrees whose ratio is reported: measured curves must hold up to there
+/// (decisions/curves-from-photographs.md), and beyond it are extrapolated.
 const WIDEST: f64 = 60.0;
 
 /// How two curves differ.

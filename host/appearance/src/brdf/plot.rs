@@ -20,7 +20,8 @@ pub struct PlotError {
 
 type Rgb = (u8, u8, u8);
 
-/// Characters across a terminal plot, and rows per decade. The scale has a label every four rows.
+/// Characters across a terminal plot, so that it fits into 80 with the scale beside it, and rows per decade.
+/// The scale has a label every four rows.
 const TERMINAL: (u32, u32) = (72, 4);
 const INKS: [Rgb; 3] = [(224, 64, 64), (48, 168, 80), (72, 112, 240)];
 

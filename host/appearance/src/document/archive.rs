@@ -15,10 +15,11 @@ use files::FileError;
 use files::shelf::{Kind, MOST_NAMES, Opened, Shelf};
 use zip::ZipArchive;
 
+use super::content::MOST_BYTES;
 use super::error::DocumentError;
-use super::source::MOST_BYTES;
 
-/// The most bytes that come out of one archive, of all the files that are read.
+/// The most bytes that come out of one archive, of all the files that are read: four of the largest that a
+/// document may have.
 const MOST_OUT: u64 = 4 * MOST_BYTES;
 
 /// The end of an archive, and where a comment behind it may push it: its record and 16 bits of length.

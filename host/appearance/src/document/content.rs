@@ -9,6 +9,10 @@ use serde::{Deserialize, Serialize};
 use crate::materials::{Factored, Materials, Surfaces, Uniform};
 use crate::views::Views;
 
+/// The most bytes in one file, as memory must hold it: an uncompressed 16-bit RGBA image of the largest page
+/// has 0.3 GB.
+pub const MOST_BYTES: u64 = 1 << 30;
+
 /// Default number of half-angle samples per curve.
 pub const SAMPLES: usize = 32;
 

@@ -10,7 +10,8 @@ use super::source::Source;
 use crate::brdf::Space;
 use crate::materials::Uniform;
 
-/// The longest curve file, in bytes.
+/// The longest curve file, in bytes: 65,536 rows, which is the most that a curve may have, of 256 characters
+/// each.
 pub(super) const MOST_BYTES: u64 = 16 << 20;
 
 /// Opens a curve file.

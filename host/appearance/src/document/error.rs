@@ -116,6 +116,7 @@ pub enum DocumentError {
 
 /// The names as a list, cut off after 24.
 pub(super) fn list(names: &[String]) -> String {
+    /// Names that a message has room for: some three lines.
     const SHOWN: usize = 24;
     match names.len() {
         0 => "none".into(),

@@ -15,10 +15,11 @@ use serde::{Deserialize, Serialize};
 
 use observe::Observer;
 
+use super::content::MOST_BYTES;
 use super::content::{Content, Document, check_size_mm};
 use super::error::DocumentError;
 use super::picture::{MOST_PIXELS, Picture};
-use super::source::{MOST_BYTES, Source};
+use super::source::Source;
 use crate::brdf::{Space, Table};
 use crate::materials::{Factored, check_reflectance};
 use crate::weights::WeightMaps;
@@ -30,7 +31,7 @@ pub(super) const FOIL: FolderKind =
 
 const BASES: &str = "bases.csv";
 
-/// The version that is written, and the only one that is read.
+/// The version that is written, and the only one that is read: a number so that a later program can tell.
 const FORMAT: u32 = 1;
 
 /// The most bases. Each has its own map, and no document needs more than a few dozen.

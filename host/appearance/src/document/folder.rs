@@ -11,13 +11,14 @@ mod settings;
 
 use std::path::Path;
 
+use super::content::MOST_BYTES;
 use super::content::{Content, Document, Options};
 use super::error::DocumentError;
 use super::layers::CoatLayer;
 use super::names::{self, Role};
 use super::picture::{Encoding, Picture};
 use super::relief;
-use super::source::{MOST_BYTES, Source};
+use super::source::Source;
 use super::texture::{Field, Plane, same_shape};
 use crate::brdf::Space;
 use crate::materials::{Surface, Surfaces, dielectric, metallic, specular};

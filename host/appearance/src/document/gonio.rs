@@ -25,7 +25,8 @@ use crate::brdf::Space;
 
 /// The largest file, in bytes: about three million measurements of three wavelengths.
 pub(super) const MOST_BYTES: u64 = 1 << 28;
-/// The most wavelengths.
+/// The most wavelengths: more than twice as many as a spectrum has from 380 to 780 nm in steps of 1 nm, so
+/// that a hostile header asks for no more memory.
 const MOST_WAVELENGTHS: usize = 1024;
 /// Cells of the half angle.
 const CELLS: usize = 64;

@@ -13,19 +13,20 @@ use std::path::Path;
 
 use roxmltree::{Node, ParsingOptions};
 
+use super::content::MOST_BYTES;
 use super::content::{Content, Document, Options, SWATCH_MM};
 use super::error::DocumentError;
 use super::layers::{CoatLayer, Layers, PbrWorkflow, build};
 use super::picture::Picture;
 use super::relief;
-use super::source::{MOST_BYTES, Source};
+use super::source::Source;
 use super::texture::Field;
 use crate::brdf::Space;
 use crate::materials::dielectric;
 
 use graph::{Graph, Link, MOST_NODES, Value};
 
-/// The largest file; pictures lie beside it.
+/// The largest file: far more than any graph; pictures lie beside it, and this is held in memory as a tree.
 const MOST_TEXT: u64 = 16 << 20;
 
 /// The inputs of a shader that are read: their names, and their values where they are not set.

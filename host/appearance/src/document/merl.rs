@@ -16,14 +16,17 @@ use super::error::DocumentError;
 use super::source::Source;
 use crate::brdf::Space;
 
+/// What stored numbers are multiplied by for red, green and blue. Source: `BRDFRead.cpp` of the MERL
+/// database.
 const SCALE: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
 
 /// The most cells per colour: eleven times as many as in the published files.
 const MOST_CELLS: u64 = 1 << 24;
 
+/// Bytes of the header: three numbers of 32 bits.
 const HEADER: usize = 12;
 
-/// The largest file, in bytes.
+/// The largest file, in bytes: its header and three numbers of 64 bits for each cell.
 pub(super) const MOST_BYTES: u64 = HEADER as u64 + 24 * MOST_CELLS;
 
 pub(super) fn open(path: &Path, space: Space, source: Source<'_>) -> Result<Document, DocumentError> {

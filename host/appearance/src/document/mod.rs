@@ -31,7 +31,7 @@ mod spectrum;
 mod tensor;
 pub(crate) mod texture;
 
-pub use content::{ColourSpace, Content, Document, Options, SAMPLES, name_of};
+pub use content::{ColourSpace, Content, Document, MOST_BYTES, Options, SAMPLES, name_of};
 pub use error::DocumentError;
 pub use open::{measured, open};
 pub use sample::write_sample;

@@ -6,9 +6,10 @@ use files::shelf::Shelf;
 use inks::Curve;
 use observe::Observer;
 
+use super::content::MOST_BYTES;
 use super::content::{Document, Options, name_of};
 use super::error::DocumentError;
-use super::source::{MOST_BYTES, Source};
+use super::source::Source;
 use super::{curve, foil, folder, gltf, gonio, materialx, merl, rgl, sample};
 use crate::brdf::Space;
 

@@ -16,13 +16,15 @@ use super::source::Source;
 use super::texture::Plane;
 use crate::srgb;
 
-/// The most pixels of a document. The largest page has 38 million dots, and no known document has more.
+/// The most pixels of a document, as memory must hold them: the largest page has 38 million dots, and no
+/// known document has more.
 pub const MOST_PIXELS: u64 = 1 << 26;
 
-/// The most pixels along one side.
+/// The most pixels along one side: twice the dots of the longest page, so that a row is small whatever a file
+/// says.
 const MOST_SIDE: u64 = 16_384;
 
-/// The most values (pixels times channels) in one image.
+/// The most values (pixels times channels) in one image: four channels of the most pixels.
 const MOST_VALUES: u64 = 1 << 28;
 
 /// The most values of floating point in one image: they take four bytes each, and twice that while they are decoded.

@@ -22,7 +22,7 @@ const CONES: Matrix = [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.
 /// # Errors
 /// Primaries that do not span colours.
 pub fn to_rec_709(primaries: &Primaries) -> Result<Option<Matrix>, String> {
-    // Programs write them with three or four digits.
+    // Programs write them with three or four digits, so that equal ones differ by so much.
     const ALIKE: f32 = 0.001;
     if primaries.iter().flatten().zip(REC_709.iter().flatten()).all(|(a, b)| (a - b).abs() <= ALIKE) {
         return Ok(None);

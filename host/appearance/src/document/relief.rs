@@ -16,7 +16,8 @@ use maths::Maths;
 /// Side of the window in pixels: about a millimetre if the document fills the page.
 pub const WINDOW: usize = 7;
 
-/// The steepest slope; steeper ones are clamped. An angle of 84 degrees.
+/// The steepest slope, an angle of 84 degrees; steeper ones are clamped, for they would be walls, which a
+/// relief of heights does not have.
 const STEEPEST: f32 = 10.0;
 
 /// The largest variance: whatever has more is as rough as a surface can be, see [`widened`].

@@ -15,17 +15,19 @@ use std::path::Path;
 
 use super::average;
 use super::content::Document;
+use super::content::MOST_BYTES;
 use super::curve;
 use super::error::DocumentError;
-use super::source::{MOST_BYTES, Source};
+use super::source::Source;
 use super::spectrum;
 use super::tensor::{Tensor, TensorFile};
 use crate::brdf::Space;
 
-/// Samples of theta_h in the curve, on the square-root grid.
+/// Samples of theta_h in the curve, on the square-root grid, as many as in MERL's files.
 const THETA_H: usize = 90;
 
-/// Cells of theta_d and phi_d in the average.
+/// Cells of theta_d and phi_d in the average: those of theta_d are 2.5 degrees wide, so that the range that
+/// is averaged begins and ends between two.
 const CELLS: (usize, usize) = (36, 36);
 
 pub(super) fn open(path: &Path, space: Space, source: Source<'_>) -> Result<Document, DocumentError> {

@@ -10,10 +10,7 @@ use super::content::name_of;
 use super::error::DocumentError;
 use observe::Observer;
 
-/// The most bytes in one file. An uncompressed 16-bit RGBA image of the largest page has 0.3 GB.
-pub const MOST_BYTES: u64 = 1 << 30;
-
-/// The most bytes in a settings file.
+/// The most bytes in a settings file: far more than anybody writes, few enough for hostile ones.
 const MOST_SETTINGS: u64 = 1 << 20;
 
 /// The most bytes by which a format is recognised.

@@ -13,6 +13,7 @@ pub fn rgb_weights(wavelengths: &[f32]) -> Option<Vec<[f64; 3]>> {
     if nm.windows(2).any(|w| w[0] >= w[1]) || *nm.first()? > 430.0 || *nm.last()? < 650.0 {
         return None;
     }
+    /// From XYZ to linear Rec. 709. Source: IEC 61966-2-1.
     const FROM_XYZ: [[f64; 3]; 3] =
         [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]];
     let mut weights: Vec<[f64; 3]> = (0..nm.len())

@@ -9,10 +9,11 @@ use std::path::{Path, PathBuf};
 
 use super::error::DocumentError;
 
-/// The most fields in a file.
+/// The most fields in a file: published ones have some ten; few enough for hostile files.
 const MOST_FIELDS: u32 = 256;
 
-/// The most dimensions in a field.
+/// The most dimensions in a field: published ones have five; each must be stored, so the bound comes before
+/// memory.
 const MOST_DIMENSIONS: u16 = 8;
 
 /// The place and shape of a field.

@@ -162,7 +162,8 @@ impl Plane {
     }
 }
 
-/// Rows that a thread computes at a time.
+/// Rows that a thread computes at a time: enough work for it, and several bands for each thread so that none
+/// waits.
 pub const BAND: usize = 64;
 
 /// The old pixels that contribute to each new one along one axis, with their weights.

@@ -11,11 +11,13 @@ use observe::Observer;
 
 use super::error::EditError;
 use crate::document::DocumentError;
+use crate::document::MOST_BYTES;
 use crate::document::picture::Picture;
-use crate::document::source::{MOST_BYTES, Source};
+use crate::document::source::Source;
 use crate::weights::ONE;
 
-/// The most by which the channels of a grey picture may differ: a step of 8 bits, and rounding.
+/// The most by which the channels of a grey picture may differ, so that a step of 8 bits and rounding is no
+/// colour.
 const GREY: f32 = 1.5 / 255.0;
 
 const EXPECTED: &str = "a grey picture, `basis:N` (where basis N is), `basis:N,WEIGHT` (where it weighs at least that, above 0 to 1), or \

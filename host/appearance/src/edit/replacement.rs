@@ -12,7 +12,8 @@ use crate::brdf::Space;
 use crate::document::{self, Content, DocumentError, Options, foil};
 use crate::materials::check_reflectance;
 
-/// The longest curve file, in bytes.
+/// The longest curve file, in bytes, as in documents: 65,536 rows, which is the most that a curve may have,
+/// of 256 characters each.
 const MOST_BYTES: u64 = 16 << 20;
 
 /// The curve of a measured material, or of a basis of another document.

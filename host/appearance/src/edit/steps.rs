@@ -49,10 +49,10 @@ use crate::weights::grey::to_grey;
 /// The name under which an edited document has its steps.
 pub const FILE_NAME: &str = "steps.toml";
 
-/// The version that is written, and the only one that is read.
+/// The version that is written, and the only one that is read: a number so that a later program can tell.
 const FORMAT: u32 = 1;
 
-/// The most steps in a file.
+/// The most steps in a file: more than anybody makes by hand, few enough for hostile files.
 const MOST_STEPS: usize = 1000;
 
 /// The most pixels of all painted masks, for memory's sake: sixteen masks of the largest document.

@@ -14,9 +14,10 @@ use maths::Maths;
 
 use super::cbrt::cbrt;
 
-/// Values of a column are kept above this share of its mean, where the cube root has a slope to follow.
+/// Values of a column are kept above this share of its mean, for at 0 the cube root's slope is infinite.
 const FLOOR: f32 = 1e-12;
-/// Rows are padded to a multiple of this, and sums use this many lanes on every processor.
+/// Rows are padded to a multiple of this, and sums use this many lanes on every processor, so that they are
+/// equal on all. Eight single numbers are a register of AVX2.
 pub(super) const LANES: usize = 8;
 
 /// Scale and weight of each column. See the module documentation.

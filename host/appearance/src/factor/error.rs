@@ -2,7 +2,8 @@
 
 use crate::weights::WeightError;
 
-/// The largest accepted reflectance (1/sr). The peak of a mirror as narrow as the sun is a tenth of it.
+/// The largest accepted reflectance (1/sr), beyond which a number would be a mistake: the peak of a mirror as
+/// narrow as the sun is a tenth of it.
 pub(super) const BRIGHTEST: f32 = 1e6;
 
 /// Why a document cannot be factored.

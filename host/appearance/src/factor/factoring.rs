@@ -118,7 +118,7 @@ fn check_size(document: &dyn Materials) -> Result<(), FactorError> {
     Ok(())
 }
 
-/// Sweeps of metric archetypes; most of the gain comes in the first ten.
+/// Sweeps of metric archetypes: most of the gain comes in the first ten.
 const SWEEPS: usize = 20;
 /// The relative decrease of the mean squared distance below which a sweep is the last one.
 const SETTLED: f64 = 1e-3;

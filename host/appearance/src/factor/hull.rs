@@ -19,6 +19,7 @@ use crate::solve::{Gram, Simplex};
 use super::pca::Pca;
 use super::sample::Sample;
 
+/// The most joins with a point, so that one that does not settle ends: about ten are needed.
 const MOST_JOINED: usize = 100;
 /// Directions tried for corners, half of them in whitened coordinates.
 const DIRECTIONS: usize = 3000;

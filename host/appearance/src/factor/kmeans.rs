@@ -21,6 +21,7 @@ use super::pca::Pca;
 use super::sample::Sample;
 
 const STARTS: u64 = 4;
+/// The most iterations, so that one that does not settle ends.
 const ITERATIONS: usize = 40;
 /// Iterations without a better hull after which the search ends.
 const IDLE: usize = 5;

@@ -11,6 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use super::parts;
 use super::sample::Sample;
 
+/// The most iterations, so that one that does not settle ends.
 const MOST_ITERATIONS: usize = 40;
 
 /// Principal axes of a sample.

@@ -16,8 +16,10 @@ use super::columns::{accumulate, dot, mix};
 use super::parts;
 use super::sample::Sample;
 
-/// The most iterations; the penalty has its full strength after [`RAMP`] of them.
+/// The most iterations, so that one that does not settle ends; the penalty has its full strength after
+/// [`RAMP`] of them.
 pub(super) const ITERATIONS: usize = 60;
+/// Iterations in which the penalty rises, 60 % of all, so that the others settle under the full one.
 const RAMP: usize = 36;
 /// The relative decrease of the objective below which it has settled.
 const SETTLED: f64 = 1e-4;

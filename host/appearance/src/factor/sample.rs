@@ -28,7 +28,7 @@ const DRAWS: usize = 1 << 16;
 const MATERIALS: usize = 20_000;
 /// The most values that are kept. Long rows leave room for fewer materials, but never fewer than [`FEWEST`].
 const VALUES: usize = 1 << 22;
-/// Room for at least this many materials, however long the rows.
+/// Room for at least this many materials, however long the rows, for fewer would miss a document's corners.
 const FEWEST: usize = 1024;
 /// The largest distance between merged materials, in the metric (0.01: barely visible).
 const MERGED: f64 = 0.005;

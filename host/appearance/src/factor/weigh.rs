@@ -15,9 +15,9 @@ use super::columns::Columns;
 use super::error::FactorError;
 use super::sample::read;
 
-/// Materials per run.
+/// Materials per run: enough work for a thread, and many runs so that no thread waits for another.
 const RUN: usize = 4096;
-/// A barely visible distance.
+/// A distance that would be barely visible: what is nearer is covered.
 const COVERED: f32 = 0.01;
 
 /// Distances between pixels and their mixtures, in the metric.

@@ -8,7 +8,7 @@ use super::result::mix::InkMix;
 use crate::brdf::{Space, Table};
 use crate::materials::Materials;
 
-/// Number of pairs of pixels that are compared.
+/// Number of pairs of pixels that are compared, so that a share of 1 % is known to 0.07 %.
 const PAIRS: usize = 20_000;
 
 /// Draws one pixel from each of equal stretches of the document.

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use super::pixels::Materials;
 
-/// Pixels per parallel task.
+/// Pixels per parallel task: enough work for a thread, and many tasks so that no thread waits for another.
 const RUN: usize = 4096;
 
 /// Which pixels have the same material. See the module documentation.

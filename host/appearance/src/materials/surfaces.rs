@@ -18,9 +18,11 @@ use super::surface::Coated;
 use super::surface::Surface;
 use crate::brdf::Space;
 
-/// The narrowest lobe that is kept; the peak of a narrower one is finer than any printable foil shows.
+/// The narrowest lobe that is kept, for the peak of a narrower one is finer than any printable foil shows.
 const LEAST_ALPHA: f32 = 0.02;
 
+/// Widths of the table, one for each value of 8 bits, as textures of roughness have them, so that none lies
+/// between two.
 const LEVELS: usize = 256;
 
 /// Lobes for unit f0 at the angles of a space, over ln(alpha).

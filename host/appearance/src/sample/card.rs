@@ -6,7 +6,9 @@ use std::f32::consts::TAU;
 use super::canvas::{Coat, DistanceField, Point, bezier, clouds, hash, inside, mix, noise, paint, smooth};
 use super::painting::Painting;
 
+/// Any size would do; golden jobs hold this one.
 const WIDTH: usize = 1024;
+/// As [`WIDTH`]: any would do. A postcard's shape.
 const HEIGHT: usize = 1443;
 
 /// A pen stroke with a broad nib held at 40 degrees: thin along the nib, wide across it.

@@ -4,10 +4,12 @@ use super::canvas::{Coat, DistanceField, Point, bezier, clouds, inside, mix, noi
 use super::painting::Painting;
 use maths::Maths;
 
+/// Any size would do; golden jobs hold this one.
 const WIDTH: usize = 1280;
+/// As [`WIDTH`]: any would do.
 const HEIGHT: usize = 960;
 
-/// Vertical offset of everything drawn.
+/// Vertical offset of everything drawn, so that the bird stands in the middle.
 const DROP: f32 = 118.0;
 
 fn dropped(p: Point) -> Point {

@@ -6,15 +6,21 @@ use std::f32::consts::TAU;
 use super::canvas::{Coat, Point, cells, clouds, hash, inside, mix, noise, paint, smooth};
 use super::painting::Painting;
 
+/// Any size would do; golden jobs hold this one.
 const SIDE: usize = 1024;
 const CENTRE: Point = [512.0, 512.0];
 
-/// Radii of the ring, of the raised face around the bore, and of the circle of bolts with its holes.
+/// Radius of the ring in pixels; any flange would do, as for all measures below.
 const OUTER: f32 = 448.0;
+/// Radius of the bore; any would do.
 const BORE: f32 = 168.0;
+/// Radius of the raised face around the bore; any between bore and bolts would do.
 const FACE: f32 = 258.0;
+/// Radius of the circle of bolts; any between face and ring would do.
 const BOLTS: f32 = 352.0;
+/// Radius of a hole; any would do that leaves room to face and ring.
 const HOLE: f32 = 42.0;
+/// Holes on the circle of bolts; any would do.
 const HOLES: usize = 8;
 
 /// Distances to the ring's outside, its bore, the step of its face and the nearest bolt hole.

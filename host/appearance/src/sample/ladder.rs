@@ -6,16 +6,18 @@
 use super::canvas::{Point, byte, encode, inside, mix};
 use super::painting::{Finish, Painting};
 
-/// Shares of the full gloss, from the left.
+/// Shares of the full gloss, from the left: any would do of which neighbours differ visibly.
 const STEPS: [f32; 4] = [1.0, 0.8, 0.5, 0.1];
 
-/// Reflectance at normal incidence for full gloss.
+/// Reflectance at normal incidence for full gloss: any would do.
 const FULL: f32 = 0.6;
 
-/// The diffuse albedo, linear.
+/// The diffuse albedo, linear: a dark blue, so that gloss is seen against it. Any would do.
 const DIFFUSE: [f32; 3] = [0.05, 0.10, 0.17];
 
+/// Any size would do; golden jobs hold this one.
 const WIDTH: usize = 1024;
+/// As [`WIDTH`]: any would do.
 const HEIGHT: usize = 320;
 
 /// A square with rounded corners: distance from its edge.

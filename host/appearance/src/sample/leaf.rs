@@ -10,13 +10,15 @@ use super::canvas::{
 use super::painting::Painting;
 use maths::Maths;
 
+/// Any size would do; golden jobs hold this one.
 const WIDTH: usize = 1024;
+/// As [`WIDTH`]: any would do.
 const HEIGHT: usize = 1448;
 
 /// The midrib from the end of the stalk to the tip.
 const MIDRIB: [Point; 4] = [[640.0, 1385.0], [520.0, 1130.0], [600.0, 520.0], [478.0, 130.0]];
 
-/// The share of the midrib that is stalk.
+/// The share of the midrib that is stalk; any leaf would do.
 const STALK: f32 = 0.2;
 
 /// A lobe: where on the blade (0 base to 1 tip) it leaves the midrib, its length and radius in pixels, and its

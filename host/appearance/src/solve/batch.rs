@@ -27,9 +27,11 @@ type Lane = [f64; LANES];
 
 /// Pixels that are sorted at a time: few enough for the second cache with 57 points, enough to fill the lanes.
 const BATCH: usize = 2048;
-/// The most mixtures to start from, beside the single points. 64 pixels of rusty metal have 14 to 18 different supports.
+/// The most mixtures to start from, beside the single points: enough, for 64 pixels of rusty metal have 14 to
+/// 18 different supports.
 const MOST_STARTS: usize = 64;
-/// Supports that are kept from batch to batch.
+/// Supports that are kept from batch to batch: eighty times as many as a document needs
+/// (decisions/gauss-newton-on-the-simplex.md), so that memory stays bounded.
 const MOST_SUPPORTS: usize = 8192;
 /// Visits before a pixel is left to the solver of one pixel: nearly twice as many as any of rusty metal has needed.
 const MOST_VISITS: u16 = 60;

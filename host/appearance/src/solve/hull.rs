@@ -17,13 +17,15 @@ use super::simplex::SimplexError;
 use super::vector::add_scaled;
 use crate::wide::wide;
 
-/// The number of columns is a multiple of this.
+/// The number of columns is a multiple of this, so that sums are equal on every processor.
 const LANES: usize = 8;
 
-/// Price of one layer of ink, in units of squared distance. It decides ties.
+/// Price of one layer of ink, in units of squared distance. It decides between mixtures that would look
+/// alike: a tenth of what is barely visible, squared.
 pub(crate) const LAYER_PRICE: f64 = 1e-6;
 
-/// Darkest radiance that differs from black, relative to the brightest radiance of any stack.
+/// Darkest radiance that differs from black, relative to the brightest radiance of any stack: its cube root
+/// is 1e-4 of the brightest one's, so that nobody sees it.
 pub(super) const DARKEST: f64 = 1e-12;
 
 /// Why there is no mixture.

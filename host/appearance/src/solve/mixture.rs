@@ -22,15 +22,18 @@ use super::simplex::{Simplex, SimplexError, frank_wolfe_gap};
 use super::vector::{add_scaled, dot};
 use crate::wide::wide;
 
-/// Relative drop of the objective below which the search ends.
+/// Relative drop of the objective below which the search ends: some thousand roundings of a double, below
+/// which a drop would be chance.
 const DROP: f64 = 1e-12;
 /// The most steps; ten times as many as the slowest of a thousand random problems needs.
 const MOST_STEPS: u32 = 100;
-/// Halvings of a step before the search gives up.
+/// Halvings of a step before the search gives up: after 30 it is a billionth, which cannot change the result
+/// visibly.
 const MOST_HALVINGS: u32 = 30;
 /// The most stacks that join the mixture in one step: most of those that seem to help do so no longer once the best have moved.
 const MOST_JOINING: usize = 3;
-/// Two starts agree if their distances differ by less than this.
+/// Two starts agree if their distances differ by less than this: a ten-thousandth of what is barely visible,
+/// as much as is measured in decisions/gauss-newton-on-the-simplex.md.
 const AGREEMENT: f64 = 1e-6;
 
 /// How good a mixture is.

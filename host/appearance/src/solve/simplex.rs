@@ -19,7 +19,8 @@ use crate::wide::wide;
 
 /// Reduced gradients within this share of the problem's scale count as zero: about a hundred roundings.
 pub(super) const TOLERANCE: f64 = 4e-14;
-/// Squared relative distance to the hull of the support below which a point counts as dependent on it.
+/// Squared relative distance to the hull of the support below which a point counts as dependent on it: some
+/// fifty roundings of a double, below which a distance would be chance.
 const PIVOT_FLOOR: f64 = 1e-14;
 
 /// A bound on the error of a solution.

@@ -12,7 +12,7 @@ use std::collections::HashMap;
 use super::gram::Gram;
 use super::vector::dot_short;
 
-/// The most points of a support that is factored. Mixtures have three to eight.
+/// The most points of a support that is factored: enough, for mixtures have three to eight.
 pub(super) const MOST_POINTS: usize = 24;
 /// Squared relative distance to the hull of the others below which a point counts as dependent on them. Here factors have to be
 /// good enough for a single solution; a solver that corrects itself does the rest.

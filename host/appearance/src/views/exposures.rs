@@ -7,7 +7,7 @@
 
 use maths::Maths;
 
-/// The luminance of the logarithmic mean.
+/// The luminance of the logarithmic mean: middle grey. Source: Reinhard and others 2002, section 3.
 const KEY: f64 = 0.18;
 
 /// The part of the pixels that may burn out in the short exposure.

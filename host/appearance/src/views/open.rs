@@ -10,8 +10,9 @@ use super::exposures::Exposures;
 use super::reach::{Reach, luminance, reach};
 use super::{FAINTEST, Views};
 use crate::brdf::{Space, Table};
+use crate::document::MOST_BYTES;
 use crate::document::picture::{Encoding, Picture};
-use crate::document::source::{MOST_BYTES, Source};
+use crate::document::source::Source;
 use crate::document::texture::{Plane, same_shape};
 use crate::document::{ColourSpace, Content, Document, DocumentError, name_of};
 use crate::gamut::Printable;
@@ -21,7 +22,7 @@ use crate::weights::{WeightError, WeightMaps, quantise};
 /// The most pixels of the document: what the largest page shows at a cluster of two dots. Finer pictures are averaged.
 const MOST_PIXELS: usize = 1 << 23;
 
-/// Channels that differ by no more than one step of 8 bits are grey.
+/// Channels that differ by no more than one step of 8 bits are grey, for rounding makes as much.
 const STEP: f32 = 1.0 / 255.0;
 
 /// What is shown in the two views.

@@ -72,6 +72,7 @@ pub(crate) fn cross(a: Light, b: Light) -> Light {
 impl Hull {
     /// The convex hull of colours: every plane through three of them that has all on one side.
     pub fn new(points: &[Light]) -> Hull {
+        /// Lengths below this are rounding: coordinates are about 1.
         const NEAR: f64 = 1e-9;
         let mut faces: Vec<(Light, f64)> = Vec::new();
         for (i, &a) in points.iter().enumerate() {

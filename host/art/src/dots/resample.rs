@@ -5,8 +5,8 @@
 //! classes, the one that most pixels of a dot have is taken, and nothing (class 0) only if more than half have it. The coverage of a solid
 //! layer is the average of a dot's pixels. So a line that covers half of its dots is whole: at 1200 dpi every line.
 //! Tones, and coverage where there are fewer pixels than dots, are interpolated (a triangle filter).
-//! Cost: nothing where pixels are dots; otherwise that of [`readers::resized`], or 2 ns a pixel. Limits: lines thinner than half a dot are lost,
-//! and a pattern of single pixels becomes solid.
+//! Cost: nothing where pixels are dots; otherwise that of [`readers::resized`], or 2 ns a pixel. Limits:
+//! lines thinner than half a dot are lost, and a pattern of single pixels becomes solid.
 
 use std::ops::Range;
 

@@ -41,7 +41,7 @@ const STRIP: usize = 64;
 const HALO: usize = 4;
 /// Neighbours of its very colour that make a dot flat: a line of one dot has two.
 const ALIKE: u8 = 2;
-/// All of them.
+/// All of them: four at its sides, four at its corners.
 const ALL: u8 = 8;
 /// Dots that are looked at together, a part of [`SIDE`].
 const BLOCK: usize = 32;

@@ -18,7 +18,7 @@ use sheet::Plane;
 /// Strokes are narrower than this many dots: 1.5 mm, more than plotters' programs ask for.
 const STROKE: usize = 36;
 
-/// The most dots of strokes and edges.
+/// The most dots of strokes and edges, so that their paths take no more memory than the page itself.
 pub const MOST_DOTS: usize = 1 << 22;
 
 /// How far in dots a straightened path may lie from the dots.

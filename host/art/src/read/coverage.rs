@@ -1,8 +1,8 @@
 //! Coverage: how much ink a layer has at each pixel of its picture.
 //!
 //! Problem: layers come in any depth and colour, with or without transparency; a layer is ink, from none to full.
-//! Method: [`Coverage`] chooses the rule by what the picture has. Cost: 1 ns a pixel; one or two bytes. Limits: 8 bits a channel; colours are
-//! taken as they are stored, without a profile.
+//! Method: [`Coverage`] chooses the rule by what the picture has. Cost: 1 ns a pixel; one or two bytes.
+//! Limits: 8 bits a channel; colours are taken as they are stored, without a profile.
 
 use std::path::{Path, PathBuf};
 

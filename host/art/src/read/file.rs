@@ -1,6 +1,7 @@
 //! The files of art, read whole or by their first bytes, and the pictures in them.
 //!
-//! Method: a file is refused by its size before it is read. Cost: its bytes in memory. Limits: a gigabyte, [`MOST_PIXELS`] pixels.
+//! Method: a file is refused by its size before it is read. Cost: its bytes in memory. Limits: a gigabyte,
+//! [`MOST_PIXELS`] pixels.
 
 use std::fs::File;
 use std::io::{BufReader, Read as _};

@@ -1,9 +1,10 @@
 //! From a picture to art: the names of its file and of its planes say which ink prints what.
 //!
-//! Problem: a picture is one layer, several plates, or colours for the process inks, and nothing in it says so but names.
-//! Method: process plates and planes that name inks become layers, beside the colours if there are any. A picture without planes is a
-//! layer if its file is named after an ink; if only a part of the name is an ink, the picture must also look like a layer. All else is
-//! colour. Cost: that of what it becomes. Limits: 16 layers are printed.
+//! Problem: a picture is one layer, several plates, or colours for the process inks, and nothing in it says
+//! so but names. Method: process plates and planes that name inks become layers, beside the colours if there
+//! are any. A picture without planes is a layer if its file is named after an ink; if only a part of the name
+//! is an ink, the picture must also look like a layer. All else is colour. Cost: that of what it becomes.
+//! Limits: 16 layers are printed.
 
 use std::path::{Path, PathBuf};
 
@@ -21,7 +22,8 @@ use crate::read::names::{self, Named, stem};
 use crate::read::picture::{self, Looks};
 use crate::read::size::{self, Unstated};
 
-/// Whether an extra channel of this name is read as a plane: one of an ink, or one whose name is a slip of one.
+/// Whether an extra channel of this name is read as a plane: one of an ink, or one whose name is a slip of
+/// one.
 pub(crate) fn is_wanted(name: &str) -> bool {
     !cut_lines::is_cut(name) && (names::ink(name).is_some() || names::closest(name).is_some())
 }

@@ -1,10 +1,11 @@
 //! OpenRaster and Krita files: layers named after inks, or one picture.
 //!
 //! Problem: painting programs keep layers in groups, shown or hidden, and name any of them.
-//! Method: a layer or group that is named after an ink is a layer of it, with all that lies in it; what is drawn in one colour is ink, of
-//! several colours the dark ([`Coverage`](crate::read::coverage::Coverage)). Its opacity is how its owner looks at it, unless its tones are kept.
-//! Without such a layer the merged picture is printed; of Krita's own files always. Cost: two bytes a pixel of the canvas and four a pixel
-//! of a layer. Limits: those of [`readers::Layered`].
+//! Method: a layer or group that is named after an ink is a layer of it, with all that lies in it; what is
+//! drawn in one colour is ink, of several colours the dark ([`Coverage`](crate::read::coverage::Coverage)).
+//! Its opacity is how its owner looks at it, unless its tones are kept. Without such a layer the merged
+//! picture is printed; of Krita's own files always. Cost: two bytes a pixel of the canvas and four a pixel of
+//! a layer. Limits: those of [`readers::Layered`].
 
 use std::path::Path;
 
@@ -115,7 +116,8 @@ pub(crate) fn read(
 /// Which layers and groups are named after inks, and what lies in them.
 fn found(path: &Path, file: &Layered) -> Result<Found, Diagnosis> {
     let (mut found, mut slips) = (Found::default(), Vec::new());
-    // The layer of ink around each of them; nothing for what lies in none; none at all for what is not printed.
+    // The layer of ink around each of them; nothing for what lies in none; none at all for what is not
+    // printed.
     let mut within: Vec<Option<Option<usize>>> = Vec::with_capacity(file.nodes.len());
     for (at, node) in file.nodes.iter().enumerate() {
         let Some(mut own) = node.within.map_or(Some(None), |group| within[group]) else {

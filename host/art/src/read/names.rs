@@ -88,6 +88,7 @@ pub(crate) fn is_whole(name: &str) -> bool {
 
 /// Whether a file is named after an ink and nothing else but a place: in `2024 white` the number is no place.
 pub(crate) fn is_exact(name: &str) -> bool {
+    /// Digits of a place, so that `2024 white` has none.
     const DIGITS: usize = 2;
     let mut numbers = name.split(|c: char| !c.is_ascii_digit());
     numbers.all(|number| number.len() <= DIGITS) && (is_whole(name) || exact(&words(name).1).is_some())
@@ -168,7 +169,7 @@ pub fn colour(text: &str) -> Result<(Ink, [u8; 3]), String> {
 
 /// What is wrong with the colours that stand for inks, after the name of their option.
 pub fn wrong_colours(colours: &[(Ink, [u8; 3])]) -> Option<String> {
-    /// Far more than cartridges.
+    /// The most inks that a list names: far more than cartridges, so that nothing real is refused.
     const MOST: usize = 16;
     if colours.len() > MOST {
         return Some(format!("is given {} times; {MOST} is the most", colours.len()));

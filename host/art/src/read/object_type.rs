@@ -42,11 +42,12 @@ pub enum ObjectType {
 }
 
 impl ObjectType {
-    /// Tag of pixels that something was drawn on, but not text or a picture.
+    /// Tag of pixels that something was drawn on, but not text or a picture. Source: `GS_VECTOR_TAG` in
+    /// Ghostscript's `gscms.h`.
     pub(crate) const DRAWING: u8 = 4;
-    /// Tag of pixels of a picture.
+    /// Tag of pixels of a picture. Source: `GS_IMAGE_TAG` in Ghostscript's `gscms.h`.
     pub(crate) const PICTURE: u8 = 2;
-    /// Tag of pixels of text.
+    /// Tag of pixels of text. Source: `GS_TEXT_TAG` in Ghostscript's `gscms.h`.
     pub(crate) const TEXT: u8 = 1;
 
     /// The kind that one of Ghostscript's tags means.

@@ -1,8 +1,9 @@
 //! Reads art from files: chooses the reader by what a file holds, and joins several files into one artwork.
 //!
-//! Method: the first bytes tell PDF, PostScript, SVG and files of layers from pictures, of which names say what they print
-//! ([`inks_by_name`]). Of several files each is the layer of an ink, and so is each page of a TIFF for which inks are named. Cost: that of the readers; files are read in pairs, so both
-//! cores work and at most two layers are in memory as bytes. Limits: layers must have the same size in pixels.
+//! Method: the first bytes tell PDF, PostScript, SVG and files of layers from pictures, of which names say
+//! what they print ([`inks_by_name`]). Of several files each is the layer of an ink, and so is each page of a
+//! TIFF for which inks are named. Cost: that of the readers; files are read in pairs, so both cores work and
+//! at most two layers are in memory as bytes. Limits: layers must have the same size in pixels.
 
 use std::path::{Path, PathBuf};
 
@@ -32,7 +33,8 @@ const OTHERS: [&str; 17] = [
     "tga", "xcf",
 ];
 
-/// The most pictures in a folder.
+/// The most pictures in a folder: several for each cartridge, so that a folder of photographs, which is a
+/// mistake, would be refused.
 const MOST_FILES: usize = 64;
 
 /// Reads art: several pictures named after their inks, a folder of them, a TIFF with named channels, an SVG with named
@@ -166,6 +168,7 @@ fn listing(folder: &Path) -> Result<Listing, Diagnosis> {
 
 /// A note on the files of a folder that are left out, if there are any.
 fn left_out(folder: &Path, others: &[PathBuf]) -> Option<String> {
+    /// Names that a message has room for: some two lines.
     const NAMED: usize = 8;
     let mut names: Vec<_> =
         others.iter().take(NAMED).filter_map(|file| Some(file.file_name()?.to_string_lossy())).collect();

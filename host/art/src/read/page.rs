@@ -25,7 +25,7 @@ use sheet::Plane;
 
 /// Rows that are read at once: they stay in the cache.
 const ROWS: usize = 32;
-/// Resolution at which a pixel is a dot.
+/// Resolution at which a pixel is a dot, so that nothing is resampled.
 const DOTS: u16 = 600;
 
 /// The pixels of a page, row by row from the top, without transparency.
@@ -144,7 +144,7 @@ fn tagged(name: &str, pixels: Vec<u8>, size: (u32, u32), dots: (usize, usize), o
 
 /// Sets the bits of the black pixels of a row, if the others are white.
 fn black(row: &[u8], bits: &mut [u8]) -> bool {
-    /// The tag is the first byte.
+    /// The tag is the first byte, so that the others are the colour.
     const COLOUR: u32 = u32::from_be_bytes([0, 255, 255, 255]);
     bits.iter_mut().zip(row.chunks(BYTES * 8)).all(|(bits, eight)| {
         let pixels = eight.as_chunks::<BYTES>().0.iter().map(|pixel| u32::from_be_bytes(*pixel) & COLOUR);

@@ -45,7 +45,8 @@ pub(crate) enum Looks {
     Tones,
 }
 
-/// What a picture looks like. One whose colours cannot be brought to sRGB looks like a layer, of which no colour matters.
+/// What a picture looks like. One whose colours cannot be brought to sRGB looks like a layer, of which no
+/// colour matters.
 pub(crate) fn looks(mut picture: Picture) -> Looks {
     let colours = picture.to_srgb().ok().and(picture.colours);
     let Some(colours) = colours else { return Looks::Layer };

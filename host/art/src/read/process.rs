@@ -22,16 +22,18 @@ const LIMIT: Duration = Duration::from_secs(60);
 /// How many pages at their limit a document may take altogether: ten minutes, unless the limit of a page is another.
 const PAGES_LIMIT: u32 = 10;
 
-/// The most pages of a document.
+/// The most pages of a document: a print of more would take days; few enough for hostile files.
 pub const MOST_PAGES: u32 = 1000;
 
 /// Environment variable with another limit in seconds, for slow computers.
 pub const LIMIT_VARIABLE: &str = "FOILPRESS_TIME_LIMIT";
 
-/// The most bytes of complaints that are kept from their beginning.
+/// The most bytes of complaints that are kept from their beginning, so that a hostile document does not fill
+/// memory with them.
 const MOST_WORDS: u64 = 1 << 16;
 
-/// The most bytes of complaints that are kept from their end, where Ghostscript sums them up.
+/// The most bytes of complaints that are kept from their end, where Ghostscript sums them up: enough for its
+/// summary.
 const LAST_WORDS: usize = 1 << 14;
 
 /// How lines begin that only tell how far Ghostscript is.

@@ -13,9 +13,10 @@ use observe::Diagnosis;
 use readers::resolution::Dpi;
 use sheet::Size;
 
-/// Millimetres in a dot.
+/// Millimetres in a dot: the printer has 600 an inch, and an inch has 25.4 mm.
 pub(crate) const MM: f64 = 25.4 / DPI;
-/// Dots in an inch, across and down; there are `Options::across` times as many across.
+/// Dots in an inch, across and down, as the printer has them; there are `Options::across` times as many
+/// across.
 pub(crate) const DPI: f64 = 600.0;
 
 /// How large to print a picture whose file states no resolution.

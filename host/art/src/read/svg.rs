@@ -46,8 +46,9 @@ use crate::read::picture;
 use crate::read::process;
 use crate::read::size::{self, Unstated};
 use find::{Cuts, Layer};
+use links::Without;
 use observe::{Diagnosis, Observer};
-use render::{Renderer, Without};
+use render::Renderer;
 use write::Way;
 
 pub(crate) use source::is_svg;
@@ -55,7 +56,7 @@ pub(crate) use source::is_svg;
 /// Name of the thread that renders a drawing. A panic in it becomes an error of the reader.
 pub const DRAWING: &str = "drawing";
 
-/// The most bytes of a drawing.
+/// The most bytes of a drawing, as memory must hold it, several times over as a tree.
 const MOST_BYTES: u64 = 1 << 28;
 
 /// Reads a drawing.

@@ -10,7 +10,7 @@ use super::ask::{self, Negotiate};
 use super::{Cartridges, Delivery, Ended, Failure, Job, News, Packed, Question, ResetOwed, number};
 use crate::connection::Address;
 use crate::connection::Bridge;
-use crate::forms::{self, Content, streams};
+use crate::encodings::{self, Content, streams};
 use crate::printers::{Printer, Printers, PrintersError, Standing};
 use crate::questions::query::{Query, Reply, is_alps};
 use crate::transit::finish::{Sheet, await_sheet};
@@ -246,9 +246,9 @@ impl Delivery<'_> {
                 true
             }),
         };
-        let checked = expanded
-            .map_err(|error| error.to_string())
-            .and_then(|()| forms::check(&bytes, self.caller.observer()).map_err(|error| error.to_string()));
+        let checked = expanded.map_err(|error| error.to_string()).and_then(|()| {
+            encodings::check(&bytes, self.caller.observer()).map_err(|error| error.to_string())
+        });
         let (name, to) = (&old.entry.name, old.entry.to.parse());
         let (Ok(checked), Ok(to)) = (checked, to) else {
             // It was checked when it was queued, and its checksum has been compared.

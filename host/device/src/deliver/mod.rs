@@ -11,13 +11,14 @@
 //! Before the first byte of a job leaves, the delivery asks whether the printer holds part of another one. The bridge's own
 //! answer decides where it can; if the bridge has forgotten, the caller has to agree to a reset. The answer holds for one
 //! start of the bridge: if it restarts between question and first byte, the question is asked again.
-//! Cost: the bytes of a job are parsed once to [check](crate::forms::check) that they are one whole legal job, because anything
-//! else wastes a sheet. Then [`streams`] codes its planes, which it reads back from bytes that come from elsewhere, and expands
-//! the code once, because a bridge must make exactly these bytes. Nothing is parsed again when a job is resumed: its checksum is compared. Only a job that a bridge
-//! refuses as pass streams is checked once more, as the ledger needs its passes.
-//! Limits: a raw device tells nothing, so nothing can be resumed there. A computer that shares a bridge with another one over the
-//! network knows only its own jobs; the bridge knows how the last sixteen have ended.
-//! Source: `docs/wire-format.md`, section 3; `docs/decisions/journal-before-deed.md`, `docs/decisions/reset-owed-by-the-printer.md`.
+//! Cost: the bytes of a job are parsed once to [check](crate::encodings::check) that they are one whole legal
+//! job, because anything else wastes a sheet. Then [`streams`] codes its planes, which it reads back from
+//! bytes that come from elsewhere, and expands the code once, because a bridge must make exactly these bytes.
+//! Nothing is parsed again when a job is resumed: its checksum is compared. Only a job that a bridge refuses
+//! as pass streams is checked once more, as the ledger needs its passes. Limits: a raw device tells nothing,
+//! so nothing can be resumed there. A computer that shares a bridge with another one over the network knows
+//! only its own jobs; the bridge knows how the last sixteen have ended. Source: `docs/wire-format.md`,
+//! section 3; `docs/decisions/journal-before-deed.md`, `docs/decisions/reset-owed-by-the-printer.md`.
 
 pub mod ask;
 mod bridge;
@@ -32,7 +33,7 @@ use protocol::link::message::{JobKind, Progress};
 
 use crate::connection::transport::Transport;
 use crate::connection::{Address, OpenError, find};
-use crate::forms::{Checked, Content, streams};
+use crate::encodings::{Checked, Content, streams};
 use crate::ledger::{self, Ledger, PassUse};
 use crate::printers::{Printer, Printers, PrintersError};
 use crate::questions::cartridges::{self, Found};
@@ -292,7 +293,7 @@ pub struct Job<'a> {
     pub name: &'a str,
     /// What is sent.
     pub content: Content<'a>,
-    /// What the [check](crate::forms::check) found.
+    /// What the [check](crate::encodings::check) found.
     pub checked: &'a Checked,
 }
 

@@ -18,7 +18,7 @@ use protocol::link::message::{ALONE, JobKind};
 use serde::{Deserialize, Serialize};
 
 use super::record::{Phase, Record};
-use crate::forms::PassPlace;
+use crate::encodings::PassPlace;
 use files::durable::{self, Access, STAGED};
 use files::scratch::private;
 

@@ -77,8 +77,9 @@ pub(crate) fn try_open(path: &Path) -> Result<(), RawError> {
     open(path).map(drop)
 }
 
-/// Hands a job over, waiting for the operator as long as it takes. The job must have been [checked](crate::forms::check()). When `stop`
-/// says so the job is brought to an [early end](press::inspect::ending), as soon as the device takes bytes.
+/// Hands a job over, waiting for the operator as long as it takes. The job must have been
+/// [checked](crate::encodings::check()). When `stop` says so the job is brought to an [early
+/// end](press::inspect::ending), as soon as the device takes bytes.
 pub(crate) fn send_while(
     job: &[u8],
     path: &Path,

@@ -5,7 +5,7 @@ use protocol::link::message::{Defect, DefectKind, Fault, JobState, Progress};
 
 use super::journal::Entry;
 use super::session::{Outcome, Phase};
-use crate::forms::PassPlace;
+use crate::encodings::PassPlace;
 
 /// What to do about a fault, with `ink` in the pass that was being printed.
 ///

@@ -15,7 +15,7 @@ use crate::axis::Axis;
 use appearance::gamut::InkMix;
 use appearance::weights::ONE;
 
-/// Stacks are padded to a multiple of this.
+/// Stacks are padded to a multiple of this, so that sums are equal on every processor.
 pub(crate) const LANES: usize = 8;
 
 /// The pixels under each of a row of equal spans of dots.

@@ -1,6 +1,7 @@
 //! Some dots of a block: a bit each.
 
-/// Side of a block in dots. The sides of cells are its divisors.
+/// Side of a block in dots: the smallest number with eight divisors, which are the sides of cells, so that
+/// blocks of any cells meet.
 pub(crate) const BLOCK: usize = 24;
 
 /// All dots of a row of a block.

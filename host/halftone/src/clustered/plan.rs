@@ -22,7 +22,7 @@ use super::evenness::{Evenness, varying};
 use super::field::Field;
 use super::mask::{BLOCK, FULL, Mask, bits, span};
 
-/// Sides a cell can have.
+/// Sides a cell can have: the divisors of a block, so that cells fill it.
 const SIZES: [usize; 8] = [1, 2, 3, 4, 6, 8, 12, 24];
 
 /// Side of the cells of a stack: the smallest whose square holds the minimum cluster.

@@ -17,7 +17,8 @@ use crate::clustered::cell::Cell;
 /// How often all cells are looked at: each pass changes stacks that differ by a quarter of the most or more.
 const PASSES: usize = 8;
 
-/// Two tones that differ by this part of all dots, or less, are settled.
+/// Two tones that differ by this part of all dots, or less, are settled: a sixteenth of a step of 8 bits,
+/// which cannot be seen.
 const SETTLED: f64 = 1.0 / 4096.0;
 
 /// A cell, or a half of one, that is to print another stack.

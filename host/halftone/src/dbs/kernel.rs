@@ -12,8 +12,8 @@ use maths::Maths;
 /// From how far the eye looks, `a` in dots: 0.3 m and 0.5 m.
 const SCALES: [f32; 2] = [7.62, 12.7];
 
-/// What the far eye's term is at distance 0, where the near one's is 1. Equal eyes have (7.62 / 12.7)^2 = 0.36. With more of the far
-/// one as much is seen from 0.5 m, and more from 0.3 m.
+/// What the far eye's term is at distance 0, where the near one's is 1. Equal eyes would have (7.62 / 12.7)^2
+/// = 0.36. Measured: with more of the far one as much is seen from 0.5 m, and more from 0.3 m.
 const FAR: f32 = 0.5;
 
 /// The autocorrelation of the eye's response in rows: for cells of one side, its values at

@@ -47,7 +47,8 @@ pub(super) const UNIT: i32 = 1 << 18;
 /// Dots without weight after which a stack's debt is set aside.
 pub(super) const ABSENT: u32 = 4096;
 
-/// Stacks in one vector operation.
+/// Stacks in one vector operation: eight numbers of 32 bits are a register of AVX2. Sums are equal on every
+/// processor, since all use as many.
 pub(super) const LANES: usize = 8;
 
 /// One number for each of eight stacks.

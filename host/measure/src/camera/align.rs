@@ -24,7 +24,7 @@ const CLEAR: f64 = 6.0;
 const STILL: f64 = 0.1;
 /// What is added to light for a second opinion, in parts of what is added for the first.
 const MORE: f32 = 4.0;
-/// Steps of the method.
+/// Steps of the method, so that one that does not settle ends.
 const ROUNDS: usize = 12;
 /// Parts of a picture along a side that are left out one by one.
 const PARTS: usize = 6;

@@ -9,11 +9,12 @@ use observe::Observer;
 use rayon::prelude::*;
 
 use super::align::{Match, Tones};
-use super::merge::Exposure;
+use super::exposure::Exposure;
 use super::response::Response;
 use crate::MeasureError;
 
-/// The largest shift that is aligned, in picture widths.
+/// The largest shift that is aligned, in picture widths: a camera that moved farther sees the can from
+/// elsewhere, which no shift would undo.
 const MOST_SHIFT: f64 = 0.02;
 /// The part of strange blocks from which photographs show different things.
 const STRANGE: f64 = 0.06;
@@ -23,12 +24,13 @@ const COMPARABLE: usize = 150;
 const MOST_RATIO: f64 = 0.4;
 /// A difference of ratios between dark and bright tones that linear values do not have.
 const BENT: f64 = 0.06;
-/// A shift is one from so many standard errors.
+/// A shift is one from so many standard errors (decisions/curves-from-photographs.md).
 const SURE: f64 = 4.0;
 /// A difference of colours between photographs that is one of white balance, as a logarithm: twice the 0.5 % by which a card's scale is
 /// uncertain anyway.
 const DRIFTS: f64 = 0.01;
-/// The same where the response of each channel was recovered, which leaves some per cent between tones.
+/// The same where the response of each channel was recovered, which leaves some per cent between tones, so
+/// that less could not be told.
 const CURVED_DRIFTS: f64 = 0.05;
 
 /// A photograph against the series.

@@ -5,7 +5,7 @@
 //! with black b, where r is the ratio of exposures; with a power g it is `r^g v`. The line is fitted with relative weights, robustly.
 //! Cost: a pass over the small copies. Limits: even places of one photograph are even in the next, so no alignment is needed.
 
-use super::merge::Exposure;
+use super::exposure::Exposure;
 use super::probe::{CLIPPED, Probe};
 use crate::MeasureError;
 use crate::linalg::median;

@@ -9,21 +9,19 @@
 //! Cost: every file is read twice; memory for one picture of sums and two photographs.
 //! Limits: shifts of up to 2 % of the picture's width, no turns.
 
-use std::path::{Path, PathBuf};
-
 use observe::Observer;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::align::Tones;
 use super::chain;
+use super::exposure::Exposure;
 use super::files;
 use super::frames::{Developed, FULL, Frames};
 use super::photo;
 use super::probe::{CLIPPED, Noise, Probe, white};
 use super::response::Response;
 use crate::MeasureError;
-use readers::Exif;
 
 /// Below so many standard deviations of noise a photograph is not used where longer ones are: sensors cut noise off at zero, so that
 /// it reads too bright, and it has next to no weight.
@@ -66,33 +64,6 @@ pub struct Radiance {
     pub bound: Vec<u8>,
     /// For each pixel the first photograph whose green is not full there, counted from the longest exposure; the last if all are.
     pub first: Vec<u8>,
-}
-
-/// A photograph with its exposure, before it is read.
-#[derive(Clone, Debug)]
-pub struct Exposure {
-    /// The file.
-    pub path: PathBuf,
-    /// Time in seconds.
-    pub seconds: f64,
-    /// What the file says.
-    pub exif: Exif,
-}
-
-impl Exposure {
-    /// Light on the sensor relative to other photographs: time, sensitivity, aperture.
-    pub(crate) fn relative(&self) -> f64 {
-        let aperture = self.exif.aperture.unwrap_or(1.0);
-        self.seconds * self.exif.iso.unwrap_or(100.0) / 100.0 / (aperture * aperture)
-    }
-
-    pub(crate) fn name(&self) -> String {
-        name(&self.path)
-    }
-}
-
-fn name(path: &Path) -> String {
-    path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
 /// Width and height of a photograph, and its small copy.

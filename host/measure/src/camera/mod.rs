@@ -5,6 +5,7 @@
 
 pub(crate) mod align;
 mod chain;
+pub(crate) mod exposure;
 mod files;
 pub mod frames;
 pub mod merge;

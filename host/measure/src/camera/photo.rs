@@ -14,11 +14,13 @@ use readers::{Bounds, Exif, Format, Samples};
 
 use crate::MeasureError;
 
-/// The most photographs of a measurement.
+/// The most photographs of a measurement: ten times as many as a thorough one has, few enough for hostile
+/// setups.
 const MOST_PHOTOS: usize = 1000;
-/// The largest file in bytes.
+/// The largest file in bytes, as memory must hold it: 100 million pixels of 16 bits and three channels have
+/// 0.6 GB.
 const MOST_BYTES: u64 = 1 << 30;
-/// The most pixels of a photograph.
+/// The most pixels of a photograph, as memory must hold it: three channels of 32 bits take 1.2 GB.
 const MOST_PIXELS: u64 = 100_000_000;
 /// How long a developer program may take.
 const PATIENCE: Duration = Duration::from_secs(120);

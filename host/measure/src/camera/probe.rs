@@ -14,7 +14,8 @@ const ACROSS: usize = 640;
 const NOISE_SAMPLES: usize = 20_000;
 /// Pixels that share the brightest value where it is the sensor's limit.
 const PILE: usize = 50;
-/// The part of the largest value up to which a sensor is trusted.
+/// The part of the largest value up to which a sensor is trusted, for near its limit it is no longer
+/// proportional to light.
 pub(crate) const CLIPPED: f32 = 0.97;
 
 /// A photograph in small.

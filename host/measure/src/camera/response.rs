@@ -8,6 +8,8 @@ use super::probe::Probe;
 use crate::MeasureError;
 use crate::linalg::Cholesky;
 
+/// Levels of the files that have a response to recover: those of 8 bits; JPEG has no others that cameras
+/// write.
 const LEVELS: usize = 256;
 /// Pixels that take part.
 const PIXELS: usize = 160;

@@ -5,7 +5,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::merge::{Exposure, Shot};
+use super::exposure::Exposure;
+use super::merge::Shot;
 use super::photo;
 use crate::MeasureError;
 use crate::setup::Setup;

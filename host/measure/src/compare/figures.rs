@@ -18,7 +18,8 @@ use super::flat::ComparedArea;
 use crate::geometry::scene::{Vector, along, cross, dot, unit};
 use crate::linalg::Cholesky;
 
-/// What makes factors unique where stacks always come together, relative to a stack that covers everything.
+/// What makes factors unique where stacks always come together, relative to a stack that covers everything:
+/// far below what photographs tell, so that it decides nothing else.
 const HELD: f64 = 1e-8;
 /// The least share of the dots that a stack must have for its factor to be told.
 const TOLD: f64 = 0.01;

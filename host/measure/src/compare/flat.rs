@@ -14,7 +14,8 @@ use appearance::weights::ONE;
 use rayon::prelude::*;
 use sheet::Area;
 
-/// Distance of spots in mm, and the width of each at half its height.
+/// Distance of spots in mm, and the width of each at half its height, so that they cover the sheet evenly
+/// (decisions/marks-and-photographs.md).
 const APART: f64 = 1.0;
 /// The most pixels along a side of a window.
 const LONGEST: f64 = 1000.0;

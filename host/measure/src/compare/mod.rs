@@ -44,7 +44,7 @@ const MOST_RESIDUAL: (f64, f64) = (1.0, 6e-4);
 const UNEVEN: f64 = 0.05;
 /// A standard error of the camera's position, in mm, that is worth a warning.
 const UNSURE: f64 = 3.0;
-/// The most photographs of a comparison.
+/// The most photographs of a comparison: ten times as many as one needs, few enough for hostile setups.
 const MOST_PHOTOS: usize = 64;
 
 /// Compares the photographs in a folder with what was printed.

@@ -20,22 +20,31 @@ use crate::linalg::Cholesky;
 
 /// The most inks of a sheet whose passes are placed: their stacks have numbers of 8 bits.
 const MOST: usize = 8;
-/// Spots that are looked at, in whole rows.
+/// Spots that are looked at, in whole rows: far more than two places for each of eight inks need, for they
+/// share errors; the time grows with them.
 const SPOTS: usize = 2000;
-/// Photographs that are looked at.
+/// Photographs that are looked at: enough, for all show the same dots, and the time grows with them.
 const PHOTOS: usize = 8;
-/// Rounds, dots that a pass moves in one, and dots that it may be off.
+/// Rounds: those of [`STEP`] dots reach [`FARTHEST`] in half of them.
 const ROUNDS: usize = 12;
+/// Dots that a pass moves in one round: what one dot either way says holds only nearby, where a moved ink
+/// still overlaps its place.
 const STEP: f64 = 4.0;
+/// Dots that a pass may be off, a millimetre, as wide as a spot: what moved farther would leave it, and
+/// slopes say nothing of it.
 const FARTHEST: i64 = 24;
-/// What a spot may be off for other reasons, as a share of the light; how far inks may be from the library; how far a pass may be, in dots.
+/// What a spot may be off for other reasons, as a share of the light. It only scales the terms below against
+/// the light: what is left over gives the standard errors.
 const NOISE: f64 = 0.01;
+/// How far inks may be from the library, as a share, so that factors of stacks that hardly show stay near 1.
 const INKS: f64 = 0.3;
+/// How far a pass may be, in dots, so that an ink that hardly shows stays where it should be.
 const PLACES: f64 = 6.0;
 /// Spots overlap, and what they are off by is alike along an edge: how many know as much as one that knows of no other.
 const ALIKE: f64 = 9.0;
 /// A pass is off if it is by so many standard errors, and by so many dots: less is within a ribbon's play.
 const SURE: f64 = 4.0;
+/// And by so many dots, for less is within a ribbon's play.
 const SLIGHT: f64 = 0.5;
 
 /// A pass that lies beside its place.

@@ -10,9 +10,9 @@ use serde::Deserialize;
 use crate::MeasureError;
 use crate::setup::parsed;
 
-/// The version of the format.
+/// The version of the format: a number so that a later program can tell.
 const FORMAT: u32 = 1;
-/// Farthest that cameras and lamps may be, in mm.
+/// Farthest that cameras and lamps may be, in mm: a hundred metres, so that a wrong unit would be an error.
 const FARTHEST: f64 = 100_000.0;
 
 /// What the camera file says.

@@ -8,14 +8,18 @@
 use crate::camera::merge::Radiance;
 use crate::linalg::median;
 
-/// The distance from a quarter to three quarters of a normal distribution, in deviations.
+/// The distance from a quarter to three quarters of a normal distribution, in deviations: 2 x 0.6745, by its
+/// definition.
 const QUARTERS: f64 = 1.349;
-/// The same distance for an edge that only the pixel blurs.
+/// The same distance for an edge that only the pixel blurs: the step is a straight line over one pixel, half
+/// of which lies between its quarters.
 const PIXEL: f64 = 0.5;
 /// The least blur that is one: a sharp edge through the middle of a pixel takes a whole pixel, which reads as 0.64.
 const LEAST: f64 = 0.65;
 /// The least step across an edge, relative to the brighter side.
 const STEP: f64 = 0.4;
+/// A blur in pixels that is worth a word: below it a foil's peak keeps its height within the band.
+const OUT_OF_FOCUS: f64 = 0.8;
 /// Lines that tell a blur.
 const FEWEST: usize = 12;
 
@@ -69,6 +73,16 @@ fn width(value: impl Fn(i64) -> Option<f64>, edge: f64, reach: f64) -> Option<f6
         Some(i as f64 - (after - level) / (after - before).max(1e-9))
     };
     Some(crossing(0.75)? - crossing(0.25)?).filter(|width| *width > 0.0)
+}
+
+/// What to do about a lens that blurs.
+pub fn advice(blur: f64, lamp: usize) -> Option<String> {
+    (blur > OUT_OF_FOCUS).then(|| {
+        format!(
+            "lamp {lamp}: the card's edges are blurred by {blur:.1} pixels, so the lens is out of focus or the camera shook: focus on the card, and \
+             close the aperture to f/8"
+        )
+    })
 }
 
 #[cfg(test)]

@@ -27,7 +27,8 @@ const EDGE: f32 = 0.2;
 const SMALLEST: f64 = 5.0;
 /// The part of a step that is left out along each side.
 const MARGIN: f64 = 0.2;
-/// A deviation of an outer step that is worth a warning.
+/// A deviation of an outer step that is worth a warning: more than the 2 % within which the scale must be
+/// (decisions/curves-from-photographs.md).
 pub const LINEAR: f64 = 0.03;
 /// A deviation that no flare explains: this is not the card.
 const NO_CARD: f64 = 0.35;

@@ -5,11 +5,13 @@
 
 use inks::Stack;
 
-use super::reduce::{CurveRow, Pixel, SampleOrigin};
+use super::extent::Pixel;
+use super::reduce::{CurveRow, SampleOrigin};
 use crate::MeasureError;
 use crate::geometry::scene::Scene;
 
-/// The largest half angle at which a highlight counts as seen, in degrees.
+/// The largest half angle at which a highlight counts as seen, in degrees: there a foil's (alpha .045) has
+/// fallen to a twentieth, so that nothing farther off would tell its height.
 const HIGHLIGHT: f64 = 5.0;
 /// Pixels a stack must have.
 const FEWEST: usize = 200;

@@ -5,11 +5,32 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::reduce::{BINS, Pixel};
 use crate::geometry::scene::{Scene, View};
 
+/// Samples of a curve over the square root of the half angle: the first ends at 0.02 degrees and the last is
+/// 2.8 degrees wide, so that a foil's peak, which is 5 degrees wide, has fifteen of them.
+pub const BINS: usize = 64;
 /// A blur in pixels below which the pixel's own extent counts most.
 const SHARP: f64 = 0.5;
+
+/// A pixel of a stack.
+#[derive(Clone, Copy, Debug)]
+pub struct Pixel {
+    /// Place in the picture, at the pixel's centre.
+    pub x: f64,
+    /// Place in the picture, at the pixel's centre.
+    pub y: f64,
+    /// The series it is from, which is also the lamp.
+    pub light: usize,
+    /// Calibrated radiance: reflectance times irradiance.
+    pub value: [f64; 3],
+    /// Relative variance.
+    pub variance: [f64; 3],
+    /// A bit for each channel that is a lower bound.
+    pub bound: u8,
+    /// The first photograph of the series that is not full there, counted from the longest exposure.
+    pub first: u8,
+}
 
 /// The middle of a bin in radians.
 pub fn angle(bin: usize) -> f64 {

@@ -2,15 +2,15 @@
 
 use rayon::prelude::*;
 
-use super::extent::place;
+use super::extent::{BINS, Pixel, place};
 use super::patches::Region;
-use super::reduce::{BINS, HORIZON, MOST, Pixel};
+use super::reduce::{HORIZON, MOST};
 use crate::camera::merge::Radiance;
 use crate::geometry::scene::Scene;
 
 /// Pixels along the sample's border that are left out.
 const BORDER: f64 = 2.5;
-/// How far a blur carries light over the border, in its deviations.
+/// How far a blur carries light over the border, in its deviations: beyond three it would be 0.1 %.
 const CARRIED: f64 = 3.0;
 
 /// Pixels of a region, without the sample's border and what is near the horizon, thinned to what a curve needs.

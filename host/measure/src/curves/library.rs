@@ -13,7 +13,7 @@ use crate::measurement::{Measurement, Taken};
 
 /// The file with all figures.
 pub const FIGURES: &str = "measurement.json";
-/// The largest file of figures that is read, in bytes.
+/// The largest file of figures that is read, in bytes, as memory must hold it: few enough for hostile files.
 const MOST_BYTES: u64 = 64 << 20;
 
 /// The name of a stack's curve file.

@@ -4,7 +4,7 @@ use readers::Pixels;
 
 use crate::camera::merge::Radiance;
 
-/// Pixels across a picture, at most.
+/// Pixels across a picture, at most: as many as a page shows, so that a report stays small.
 const ACROSS: usize = 900;
 
 /// A small copy of a series for people.

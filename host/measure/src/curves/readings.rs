@@ -17,13 +17,14 @@ use serde::Deserialize;
 
 use crate::MeasureError;
 
-/// The largest file of readings, in bytes.
+/// The largest file of readings, in bytes: people write them by hand; few enough for hostile files.
 const MOST_BYTES: u64 = 1 << 16;
-/// Samples of the curve.
+/// Samples of the curve: enough that a cubic between them is exact to far below the readings' error.
 const SAMPLES: u32 = 96;
 /// The uncertainty of the body, as a share: a unit of CIELAB.
 const BODY: f64 = 0.03;
-/// Reflectance at normal incidence of a clear surface of index 1.5.
+/// Reflectance at normal incidence of a clear surface: index 1.5, as varnish has. Source: Fresnel's equation,
+/// ((1.5 - 1) / (1.5 + 1))^2.
 const CLEAR: f64 = 0.04;
 /// The share of light that the surface takes before it reaches the body, as in the model of the library.
 const INTERFACE: f64 = 0.04;

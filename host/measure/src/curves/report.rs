@@ -14,8 +14,9 @@ use crate::MeasureError;
 use crate::camera::series::seconds;
 use crate::measurement::{MeasuredStack, Measurement};
 
+/// Lines of red, green and blue that can be told apart on white. Any would do.
 const COLOURS: [(u8, u8, u8); 3] = [(208, 48, 48), (32, 140, 64), (48, 88, 220)];
-/// The largest picture that is put into a page, in bytes.
+/// The largest picture that is put into a page, in bytes: browsers must hold the page as text.
 const MOST_PICTURE: u64 = 16 << 20;
 
 /// The page of a measurement's folder: a single HTML file that loads nothing else.

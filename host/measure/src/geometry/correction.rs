@@ -26,7 +26,7 @@ const MORE_ALIKE: f64 = 1.2;
 const PARTS: f64 = 12.0;
 /// The cosine of incidence at the outline from which it is bright enough.
 const GRAZING: f64 = 0.2;
-/// Steps of the method.
+/// The most steps of the method, so that one that does not settle ends.
 const STEPS: usize = 14;
 
 /// A pixel that takes part.

@@ -13,7 +13,8 @@ use crate::camera::merge::Shot;
 use crate::linalg::median;
 use crate::setup::{SampleShape, Setup};
 
-/// A correction beyond this many tolerances is a mistake.
+/// A correction beyond this many tolerances is a mistake: a tolerance is a standard deviation, and three of
+/// them would be chance once in 370 times.
 const MISTAKE: f64 = 3.0;
 /// What the alignment of photographs that were moved may leave, in pixels.
 const SLIP: f64 = 0.15;

@@ -130,11 +130,12 @@ pub struct SolvedCamera {
 
 /// Standard deviations of the radial terms before anything is seen: those of ordinary lenses.
 const BENT: [f64; 2] = [0.3, 0.3];
-/// Standard error of a corner in pixels, at least.
+/// Standard error of a corner in pixels, at least: what is measured with 1 % noise is 0.025
+/// (decisions/marks-and-photographs.md), so that a perfect fit claims no perfect pose.
 const LEAST_ERROR: f64 = 0.02;
-/// Steps of the method.
+/// The most steps of the method, so that one that does not settle ends.
 const STEPS: usize = 60;
-/// Unknowns of the lens.
+/// Unknowns of the lens: focal length and two radial terms. Source: Zhang 2000, section 3.3.
 const LENS: usize = 3;
 
 /// Solves for the camera from what each photograph of `width` x `height` pixels shows. Each has at least eight points.

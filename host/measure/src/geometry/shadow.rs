@@ -12,10 +12,13 @@ use super::scene::Scene;
 use crate::camera::merge::Radiance;
 use crate::linalg::median;
 
-/// Cosines of incidence that are dark under a small lamp; of these the darkest part counts, which is so under wider ones too.
+/// Cosines of incidence that are dark under a small lamp, from 3 to 30 degrees beyond the edge, so that a
+/// wider one leaves some of them dark.
 const DARK: (f64, f64) = (-0.5, -0.05);
+/// The part of these that counts, the darkest, which is dark under wider lamps too, so that their penumbra is
+/// left out.
 const DARKEST: f64 = 0.3;
-/// Those just beyond the edge of a point lamp's light, farther than tape and pixels err (a degree).
+/// Those just beyond the edge of a point lamp's light: a degree from it, for tape and pixels err by less.
 const BEYOND: (f64, f64) = (-0.06, -0.02);
 /// Those from which the slope of the lit side comes.
 const LIT: (f64, f64) = (0.1, 0.25);
@@ -23,7 +26,7 @@ const LIT: (f64, f64) = (0.1, 0.25);
 const OUTLINE: f64 = 0.12;
 /// The blur in pixels from which the edge says nothing of the lamp.
 const SHARP: f64 = 0.5;
-/// Pixels that tell a level.
+/// Pixels that tell a level, so that noise of 6 % averages to 1 %.
 const FEWEST: usize = 40;
 /// The largest lamp that is looked for, as the sine of its half angle.
 const WIDEST: f64 = 0.3;

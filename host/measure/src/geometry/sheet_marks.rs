@@ -15,7 +15,8 @@ use super::grey::Grey;
 use super::marks::{self, Mark};
 use crate::MeasureError;
 
-/// Dots along a side of a pixel in which marks are looked for.
+/// Dots along a side of a pixel in which marks are looked for: a cell has 30 dots, so that it keeps ten,
+/// which is enough for the detector.
 const FACTOR: usize = 3;
 /// The half angle at which stacks are seen there, in radians: beside the highlight.
 const BESIDE: f64 = 0.7;
@@ -23,7 +24,8 @@ const BESIDE: f64 = 0.7;
 const SAMPLES: usize = 64;
 /// Bare paper around the printable area, in those pixels: a mark may stand at its very edge.
 const AROUND: usize = 24;
-/// The fewest marks that tell a sheet.
+/// The fewest marks that tell a sheet, so that another one passes once in 16 million
+/// (decisions/marks-and-photographs.md).
 pub(crate) const FEWEST: usize = 3;
 
 /// A mark of the sheet.

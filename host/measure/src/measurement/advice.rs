@@ -2,7 +2,7 @@
 
 use crate::MeasureError;
 use crate::camera::series;
-use crate::curves::{coverage, reduce};
+use crate::curves::{blur, coverage, reduce};
 use crate::geometry::measures;
 use crate::geometry::scene::Scene;
 use crate::setup::Setup;
@@ -10,9 +10,8 @@ use crate::setup::Setup;
 use super::Measurement;
 use super::look::SeriesRecord;
 
-/// A blur in pixels that is worth a word: below it a foil's peak keeps its height within the band.
-const OUT_OF_FOCUS: f64 = 0.8;
-/// A share of other light that is worth a word.
+/// A share of other light that is worth a word: as much as a curve may be off
+/// (decisions/curves-from-photographs.md).
 const FOREIGN: f64 = 0.03;
 
 /// A series that does not fit its setup file may be one under other light or out of focus: where the dark side of the can or the card shows that,
@@ -23,27 +22,17 @@ pub fn likelier(error: MeasureError, tape: &Scene, seen: &[SeriesRecord]) -> Mea
         let shadow = seen.series.shadow.as_ref().map_or(0.0, |shadow| shadow.level[1]);
         shadow > FOREIGN * grey * seen.series.card.darkest || seen.series.card.advice(i + 1).is_some()
     });
-    let blur = seen.iter().map(|seen| seen.series.blur).fold(0.0, f64::max);
+    let widest = seen.iter().map(|seen| seen.series.blur).fold(0.0, f64::max);
     let cause = if foreign {
         "other light than the lamp's falls on the can or the card, and the geometry does not fit it; cover the table with black cloth, darken \
          the room, and give a photograph with the lamp off (photos.lamp_off)"
             .to_owned()
-    } else if let Some(blurred) = blurred(blur, 1) {
+    } else if let Some(blurred) = blur::advice(widest, 1) {
         blurred
     } else {
         return error;
     };
     MeasureError::Scene(format!("{cause}. Otherwise: {error}"))
-}
-
-/// What to do about a lens that blurs.
-pub fn blurred(blur: f64, lamp: usize) -> Option<String> {
-    (blur > OUT_OF_FOCUS).then(|| {
-        format!(
-            "lamp {lamp}: the card's edges are blurred by {blur:.1} pixels, so the lens is out of focus or the camera shook: focus on the card, and \
-             close the aperture to f/8"
-        )
-    })
 }
 
 /// What the dark side of the can says of the light.
@@ -91,7 +80,7 @@ pub fn of(measurement: &Measurement) -> Vec<String> {
         let clipped = measurement.stacks.iter().filter(|stack| coverage::is_clipped(&stack.rows));
         let clipped: Vec<&str> = clipped.map(|stack| &*stack.stack).collect();
         again.extend(series.card.advice(i + 1));
-        again.extend(blurred(series.blur, i + 1));
+        again.extend(blur::advice(series.blur, i + 1));
         again.extend(series::advice(&series.shots, i + 1, &clipped));
     }
     again.extend(measurement.stacks.iter().flat_map(|stack| coverage::advice(&stack.stack, &stack.rows)));

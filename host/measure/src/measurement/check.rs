@@ -9,10 +9,11 @@ use std::path::Path;
 use observe::Observer;
 use sheet::DotMap;
 
+use super::finish;
 use super::look::{Looked, look};
-use super::{advice, finish};
 use crate::MeasureError;
 use crate::camera::series;
+use crate::curves::blur;
 use crate::curves::card::LINEAR;
 use crate::setup::Setup;
 
@@ -63,7 +64,7 @@ pub fn check(
                 for seen in &looked.seen {
                     let lamp = seen.light + 1;
                     problems.extend(seen.series.card.advice(lamp));
-                    problems.extend(advice::blurred(seen.series.blur, lamp));
+                    problems.extend(blur::advice(seen.series.blur, lamp));
                 }
             }
         }
@@ -101,7 +102,7 @@ impl Check {
                     100.0 * worst
                 ));
             }
-            if advice::blurred(seen.series.blur, lamp).is_none() {
+            if blur::advice(seen.series.blur, lamp).is_none() {
                 self.good.push(format!(
                     "lamp {lamp}: the card's edges are sharp to {:.1} pixels",
                     seen.series.blur

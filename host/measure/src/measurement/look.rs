@@ -8,18 +8,19 @@ use inks::Stack;
 use observe::Observer;
 use sheet::DotMap;
 
-use super::{PhotoSeries, advice};
+use super::PhotoSeries;
+use crate::camera::exposure::Exposure;
 use crate::camera::frames::Frames;
-use crate::camera::merge::{self, Exposure};
+use crate::camera::merge;
 use crate::camera::residual_shift::ResidualShifts;
 use crate::camera::series;
 use crate::curves::blur;
 use crate::curves::card;
 use crate::curves::coverage;
+use crate::curves::extent::Pixel;
 use crate::curves::gather;
 use crate::curves::patches::{ChartOnSample, Region};
 use crate::curves::pictures::Copy;
-use crate::curves::reduce::Pixel;
 use crate::geometry::correction;
 use crate::geometry::scene::Scene;
 use crate::geometry::shadow;
@@ -154,7 +155,7 @@ impl Photos<'_> {
         let regions = match &self.chart {
             // A lens that is out of focus hides marks, too.
             Some(chart) => chart.regions(&path, &radiance, scene).map_err(|error| {
-                match advice::blurred(blur, light + 1) {
+                match blur::advice(blur, light + 1) {
                     Some(said) => MeasureError::Scene(format!("{said}. Otherwise: {error}")),
                     None => error,
                 }

@@ -17,8 +17,8 @@ use sheet::DotMap;
 use crate::MeasureError;
 use crate::camera::merge::Shot;
 use crate::curves::card::Calibration;
-use crate::curves::extent;
-use crate::curves::reduce::{self, CurveRow, Doubts, Pixel, Reduced};
+use crate::curves::extent::{self, Pixel};
+use crate::curves::reduce::{self, CurveRow, Doubts, Reduced};
 use crate::geometry::correction::{self, GeometrySample};
 use crate::geometry::measures::{self, Corrected};
 use crate::geometry::scene::Scene;
@@ -29,7 +29,7 @@ use look::{Looked, SeriesRecord};
 
 pub use check::{Check, check};
 
-/// Pixels that correct the geometry.
+/// Pixels that correct the geometry: enough for a dozen unknowns, and a step's time grows with them.
 const SOLVING: usize = 6000;
 
 /// Solutions of the geometry after the first, each with the curves of the one before.
@@ -135,7 +135,7 @@ pub fn measure(
 
 /// Some pixels of every stack, spread over the half angles.
 fn samples(scene: &Scene, seen: &[SeriesRecord], patches: usize) -> Vec<GeometrySample> {
-    let mut bins: Vec<Vec<GeometrySample>> = vec![Vec::new(); patches * reduce::BINS];
+    let mut bins: Vec<Vec<GeometrySample>> = vec![Vec::new(); patches * extent::BINS];
     for (patch, pixel) in seen
         .iter()
         .flat_map(|seen| seen.pixels.iter().enumerate().flat_map(|(i, p)| p.iter().map(move |p| (i, p))))
@@ -147,8 +147,8 @@ fn samples(scene: &Scene, seen: &[SeriesRecord], patches: usize) -> Vec<Geometry
         }
         let variance: f64 =
             pixel.value.iter().zip(&pixel.variance).map(|(v, r)| (v / 3.0 / mean).powi(2) * r).sum();
-        let bin = ((view.theta / std::f64::consts::FRAC_PI_2).sqrt() * reduce::BINS as f64) as usize;
-        bins[patch * reduce::BINS + bin.min(reduce::BINS - 1)].push(GeometrySample {
+        let bin = ((view.theta / std::f64::consts::FRAC_PI_2).sqrt() * extent::BINS as f64) as usize;
+        bins[patch * extent::BINS + bin.min(extent::BINS - 1)].push(GeometrySample {
             x: pixel.x,
             y: pixel.y,
             light: pixel.light,

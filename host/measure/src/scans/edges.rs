@@ -9,7 +9,8 @@ use sheet::DotMap;
 
 use super::scan::TonePatch;
 
-/// Dots in either direction.
+/// Dots in either direction, 85 um: more than thrice the largest dot gain of decisions/dots-from-scans.md,
+/// which the search must bracket.
 pub(crate) const FAR: f64 = 2.0;
 /// Places along a side of a dot.
 const FINE: usize = 5;

@@ -24,24 +24,32 @@ use super::scan::{Between, Scan, TonePatch};
 use crate::MeasureError;
 use crate::geometry::sheet_marks::SheetMarks;
 
-/// What is left out at the edges of a patch, in dots, and over how many its weight rises.
+/// What is left out at the edges of a patch, in dots: 0.4 mm, for a scanner's blur and the neighbour's
+/// spreading ink reach that far.
 const INSET: usize = 10;
+/// Over how many dots a patch's weight rises, a millimetre, so that no row of clusters counts wholly or not
+/// at all.
 const SOFT: f64 = 24.0;
-/// A tone may differ this much from the expected one, relative to it, for a size to hold.
+/// A tone may differ this much from the expected one, relative to it, for a size to hold
+/// (decisions/dots-from-scans.md).
 const HOLDS: f64 = 0.06;
-/// The largest sizes, which have to agree with each other before any others are looked at, and how closely.
+/// The largest sizes, which have to agree with each other before any others are looked at
+/// (decisions/dots-from-scans.md).
 const FIRST: usize = 3;
+/// How closely they must agree (decisions/dots-from-scans.md).
 const AGREE: f64 = 0.03;
-/// A gap that its surroundings close but for this part of it is none.
+/// A gap that its surroundings close but for this part of it is none (decisions/dots-from-scans.md).
 const OPEN: f64 = 0.25;
-/// Sizes that disagree about the dot gain so many times less with another tone curve say that the file has it, ...
+/// Sizes that disagree about the dot gain so many times less with another tone curve say that the file has it
+/// (decisions/dots-from-scans.md), ...
 const BETTER: f64 = 2.0;
 /// ... if they disagree by this much, in um: less is within what sizes scatter by anyway.
 const SCATTER_UM: f64 = 0.4;
-/// Windows along the ramp, and the height of their middle part in dots.
+/// Windows along the ramp: steps of 5 % of tone, which is enough to draw a curve.
 const TONES: usize = 20;
 const BAND: usize = 320;
-/// A ramp that is this far from what its dots and their gain say is not linear.
+/// A ramp that is this far from what its dots and their gain say is not linear: as much as sizes may
+/// disagree.
 pub const LINEAR: f64 = 0.03;
 
 /// What the chart says.

@@ -24,14 +24,18 @@ use crate::linalg::{Cholesky, median};
 
 /// Profiles across an edge of the sheet.
 const PROFILES: usize = 160;
-/// What is darker than this part of the paper is not the sheet, and over how many mm it has to be.
+/// What is darker than this part of the paper is not the sheet: a scanner's light would fall off by half as
+/// much at most (decisions/dots-from-scans.md).
 const DARK: f64 = 0.7;
+/// Over how many mm it has to be so dark, so that dust and a printed line are no edge.
 const BEYOND: f64 = 1.0;
 /// Half the length of a profile across the edge, in mm.
 const REACH: f64 = 0.4;
-/// From a mark outward to where the search for the edge starts, in mm.
+/// From a mark outward to where the search for the edge starts, in mm, so that the mark's own side is not
+/// taken for it.
 const START: f64 = 0.6;
-/// A resolution that differs more from the one that the marks show is not that of the scan.
+/// A resolution that differs more from the one that the marks show is not that of the scan: one that a
+/// program changed would be off by more.
 const SCALE: f64 = 0.03;
 /// Across, a print is as long as its dots say, within this part.
 const ACROSS: f64 = 0.006;

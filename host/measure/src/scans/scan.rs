@@ -30,9 +30,9 @@ const FRINGE: f64 = 0.03;
 const INSET: usize = 16;
 /// Places of a solid strip, along it.
 const PLACES: usize = 24;
-/// Terms of a surface.
+/// Terms of a surface: as many as `Surface::terms_at` lists.
 const TERMS: usize = 9;
-/// A share of full or empty pixels in a solid from which it is clipped.
+/// A share of full or empty pixels in a solid from which it is clipped: fewer would be dust.
 const CLIPPED: f64 = 0.02;
 /// Stacks whose light differs less than this, relative to the brighter one, cannot be told apart.
 const CONTRAST: f64 = 0.06;

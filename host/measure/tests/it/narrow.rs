@@ -3,7 +3,8 @@
 //! Pixels are made here: each is the mean of rays through its area, under a lamp without extent.
 
 use inks::ggx;
-use measure::curves::reduce::{CurveRow, Doubts, Pixel, SampleOrigin, reduce};
+use measure::curves::extent::Pixel;
+use measure::curves::reduce::{CurveRow, Doubts, SampleOrigin, reduce};
 use measure::geometry::scene::Scene;
 use measure::setup::Setup;
 use rayon::prelude::*;

@@ -59,6 +59,35 @@ impl Block {
     }
 }
 
+impl Layout {
+    /// The corner of a copy of so many dots, in dots of the printable area, and what of it lies beyond what the printer reaches.
+    ///
+    /// # Errors
+    /// Settings out of range, and of a layout that does not cut, what is beyond.
+    pub fn placed(&self, size: (usize, usize)) -> Result<((i64, i64), Option<Cut>), LayoutError> {
+        let block = Block::of(size, self)?;
+        Ok(((block.place.left, block.place.top), block.cut))
+    }
+
+    /// Width and length in dots of the largest copy that can be printed where the position says and as often as the grid says,
+    /// marks not counted.
+    pub fn largest(&self) -> (usize, usize) {
+        let whole = self.room();
+        let (left, top) = start(self, whole);
+        // From a corner beyond the room nothing can be printed, which the layout itself refuses.
+        let rest = whole.meet(Rect { left, top, ..whole });
+        let room = if rest.width() > 0 && rest.length() > 0 { rest } else { whole };
+        let (columns, rows) = match self.repeat {
+            Repeat::Grid(columns, rows) => (columns.max(1), rows.max(1)),
+            Repeat::Fill => (1, 1),
+        };
+        let share = |room: i64, count: u16, gap: Mm| {
+            ((room + gap.dots()) / i64::from(count) - gap.dots()).max(0) as usize
+        };
+        (share(room.width(), columns, self.gap.0), share(room.length(), rows, self.gap.1))
+    }
+}
+
 /// Columns and rows.
 fn grid(layout: &Layout, size: (i64, i64), gap: (i64, i64), room: Rect) -> Result<(u16, u16), LayoutError> {
     match layout.repeat {
@@ -92,7 +121,7 @@ fn grid(layout: &Layout, size: (i64, i64), gap: (i64, i64), room: Rect) -> Resul
 }
 
 /// The top left corner of a block that is as large as its room.
-pub(super) fn start(layout: &Layout, room: Rect) -> (i64, i64) {
+fn start(layout: &Layout, room: Rect) -> (i64, i64) {
     match layout.position {
         Position::Centred => (room.left, room.top),
         _ => corner(layout, (0, 0), room),

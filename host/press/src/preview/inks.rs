@@ -52,8 +52,8 @@ impl FromStr for Ground {
     }
 }
 
-/// A picture of an area of a sheet in its inks as PNG, one pixel a dot; of a sheet with `across` dots in 1/600 inch, each row
-/// is repeated as often, so that the picture has the sheet's shape.
+/// A picture of an area of a sheet in its inks as PNG, one pixel a dot; of a sheet with `across` dots in
+/// 1/600 inch, each row is repeated as often, so that the picture has the sheet's shape.
 ///
 /// # Errors
 /// None is known: the data is of the picture's size.

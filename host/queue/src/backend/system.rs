@@ -11,7 +11,7 @@ use protocol::status;
 
 use crate::messages::{Reason, Report};
 use device::deliver::{Caller, Cartridges, Failure, News, Question};
-use device::forms::PassPlace;
+use device::encodings::PassPlace;
 use device::questions::cartridges::Found;
 use device::transit::{Event, Wish, words};
 use files::durable::{self, Access};

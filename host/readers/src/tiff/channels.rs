@@ -1,14 +1,15 @@
 //! TIFF files whose channels have names: CMYK plates, spot channels, or both.
 //!
-//! Problem: drawing programs export spot inks as extra channels. Their names stand in one of two places, and a full plate is
-//! either the largest value or zero.
-//! Method: names come from the InkNames tag (every channel is an ink, the largest value is full) or from Photoshop's
-//! resource block (extra channels only, 0 is full, as Photoshop displays them). CMYK channels are the plates of the
-//! process inks. An extra channel that the file calls opacity, and whose name nobody wants, is the transparency of all others.
-//! The decoder drops extra channels unless the file is greyscale, so the photometric tag is changed in memory
-//! first.
-//! Cost: the file in memory twice, and one byte a pixel for each channel. Limits: 8 and 16 bits a channel; one page ([`pages`](super::pages)).
-//! Source: TIFF 6.0 sections 16 and 18; Adobe's file format specification for the resource block.
+//! Problem: drawing programs export spot inks as extra channels. Their names stand in one of two places, and
+//! a full plate is either the largest value or zero.
+//! Method: names come from the InkNames tag (every channel is an ink, the largest value is full) or from
+//! Photoshop's resource block (extra channels only, 0 is full, as Photoshop displays them). CMYK channels are
+//! the plates of the process inks. An extra channel that the file calls opacity, and whose name nobody wants,
+//! is the transparency of all others. The decoder drops extra channels unless the file is greyscale, so the
+//! photometric tag is changed in memory first.
+//! Cost: the file in memory twice, and one byte a pixel for each channel. Limits: 8 and 16 bits a channel;
+//! one page ([`pages`](super::pages)). Source: TIFF 6.0 sections 16 and 18; Adobe's file format specification
+//! for the resource block.
 
 use std::path::Path;
 
@@ -47,7 +48,8 @@ enum Channel {
     Opacity { multiplied: bool },
 }
 
-/// Reads a TIFF with plates, or with extra channels of which any is `wanted`; `None` if it is a plain picture.
+/// Reads a TIFF with plates, or with extra channels of which any is `wanted`; `None` if it is a plain
+/// picture.
 pub(crate) fn read(
     bytes: &[u8],
     name: &Path,

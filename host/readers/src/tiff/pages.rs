@@ -130,7 +130,8 @@ pub fn count(bytes: &[u8]) -> usize {
     directories(bytes).len()
 }
 
-/// Makes a page the first picture of the file in memory: the one of this number, else the first that is no copy.
+/// Makes a page the first picture of the file in memory: the one of this number, else the first that is no
+/// copy.
 ///
 /// # Errors
 /// No page of this number.

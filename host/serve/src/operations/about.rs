@@ -4,7 +4,6 @@
 
 use ipp::value::IppValue;
 
-use super::Place;
 use crate::jobs::{Job, State};
 use crate::printer;
 use crate::server::{Data, Server};
@@ -12,7 +11,7 @@ use crate::template::{AUTO, keyword_of};
 use crate::values::{
     date_time, each, integer, keyword, keywords, list, long_text, name, now, range, read_text, uri,
 };
-use crate::wire::Request;
+use crate::wire::{Place, Request};
 use queue::messages::Reason;
 
 /// The attributes that a client wants to see.

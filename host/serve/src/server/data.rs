@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use crate::jobs::{Job, State};
-use crate::template::{Size, paper, size};
+use crate::template::{Loaded, paper, size};
 
 /// What a cartridge says of itself.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
@@ -23,15 +23,6 @@ pub struct Cartridge {
     pub colour: &'static str,
     /// Whether there is ribbon.
     pub is_loaded: bool,
-}
-
-/// The sheet that is in the printer, as somebody has said.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
-pub struct Loaded {
-    /// Its size.
-    pub size: Size,
-    /// What it is made of; [`crate::template::AUTO`] for what the preset says.
-    pub kind: String,
 }
 
 /// What outlives the process beside jobs.

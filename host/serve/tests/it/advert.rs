@@ -7,8 +7,9 @@ use std::collections::BTreeMap;
 use std::net::UdpSocket;
 use std::time::{Duration, Instant};
 
-use serve::advert::{Advert, title};
-use serve::http::Limits;
+use serve::advert::Advert;
+use serve::body::Limits;
+use serve::printer::title;
 use testing::ipp;
 
 use super::Running;

@@ -1,6 +1,6 @@
 //! The desk in a real browser, on a desk and on a phone.
 
-use serve::http::Limits;
+use serve::body::Limits;
 use testing::browser::Browser;
 
 use super::Running;

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use serve::http::Limits;
+use serve::body::Limits;
 use testing::needs::Need;
 
 use super::Running;

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use serve::http::Limits;
+use serve::body::Limits;
 use testing::ipp::http;
 
 use super::Running;

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use observe::Silent;
 use press::inspect::inspect;
-use serve::http::Limits;
+use serve::body::Limits;
 use serve::jobs::State;
 use testing::ipp::{self, Attribute};
 use testing::pwg::{self, Kind};

@@ -8,10 +8,9 @@ use std::time::{Duration, Instant};
 use observe::Silent;
 use press::inspect::inspect;
 use protocol::paper::Paper;
-use serve::http::Limits;
+use serve::body::Limits;
 use serve::jobs::{Job, State};
-use serve::server::Loaded;
-use serve::template::{AUTO, size};
+use serve::template::{AUTO, Loaded, size};
 use testing::ipp::{self, Attribute};
 
 use super::Running;

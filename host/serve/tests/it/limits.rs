@@ -4,7 +4,7 @@ use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-use serve::http::Limits;
+use serve::body::Limits;
 use serve::jobs::State;
 use testing::ipp::{self, CANCEL, PRINT, http, print, request};
 

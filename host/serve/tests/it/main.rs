@@ -16,7 +16,8 @@ use std::sync::Arc;
 use inks::Library;
 use make::options::Choices;
 use observe::Silent;
-use serve::http::{Limits, run};
+use serve::body::Limits;
+use serve::http::run;
 use serve::server::{Preset, Server, Settings};
 use tempfile::TempDir;
 

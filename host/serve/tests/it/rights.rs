@@ -2,12 +2,12 @@
 
 use std::net::IpAddr;
 
-use serve::http::Limits;
+use serve::body::Limits;
 use serve::jobs::{Owner, State};
-use serve::operations::{Place, answer};
+use serve::operations::answer;
 use serve::server::Server;
 use serve::template::Ticket;
-use serve::wire::Request;
+use serve::wire::{Place, Request};
 use testing::ipp;
 
 use super::Running;

@@ -174,8 +174,8 @@ impl MediaArgs {
     }
 }
 
-/// What a sheet is made of by its name: in the words of owners, whose decals come off film that went through curl correction, or one of the
-/// printer's own media types.
+/// What a sheet is made of by its name: in the words of owners, whose decals come off film that went through
+/// curl correction, or one of the printer's own media types.
 fn handling(name: &str) -> Result<Handling, String> {
     let found = MEDIA.typed().find(|value| value.name.eq_ignore_ascii_case(name));
     let handling =

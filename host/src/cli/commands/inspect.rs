@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::cli::console::{read_job, stdout};
 use crate::cli::output::{Kind, Staged};
-use device::forms::streams;
+use device::encodings::streams;
 use observe::Observer;
 use press::inspect::{Inspected, Inspection, inspect, sheets};
 use press::separate::files::{self, save_plane};

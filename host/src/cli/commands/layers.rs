@@ -401,7 +401,8 @@ impl Args {
 }
 
 impl Work {
-    /// Reads the art, composes it, and hands what is to be printed to `then`. `page` makes the page of a layout.
+    /// Reads the art, composes it, and hands what is to be printed to `then`. `page` makes the page of a
+    /// layout.
     fn with<T>(
         &self,
         page: impl FnOnce(Layout) -> PageSettings,

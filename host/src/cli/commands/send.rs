@@ -10,7 +10,7 @@ use crate::cli::console::read_job;
 use crate::cli::printing::deliver::{Order, deliver, store};
 use device::connection::Destination;
 use device::deliver::Job;
-use device::forms::{self, Content};
+use device::encodings::{self, Content};
 use observe::Observer;
 
 /// Arguments of `send`.
@@ -45,7 +45,7 @@ pub struct Args {
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let bytes = read_job(&args.job)?;
     let name = args.job.file_name().map_or_else(|| "job".into(), |name| name.to_string_lossy().into_owned());
-    let checked = forms::check(&bytes, observer)?;
+    let checked = encodings::check(&bytes, observer)?;
     let job = Job { name: &name, content: Content::Bytes(&bytes), checked: &checked };
     if args.store {
         return store(job, &args.to, observer);

@@ -122,7 +122,8 @@ mod with_server {
     use anyhow::{Context as _, bail};
     use clap::FromArgMatches as _;
     use serve::advert::{Advert, has_avahi, is_real};
-    use serve::http::{self, Limits};
+    use serve::body::Limits;
+    use serve::http;
     use serve::install::{Places, Service, UNIT};
     use serve::server::{Preset, Server, Settings, identities};
     use serve::worker;

@@ -96,10 +96,10 @@ mod tests {
     use appearance::gamut::{GamutError, MixError};
     use appearance::solve::MixtureError;
     use appearance::weights::WeightError;
+    use device::encodings::Unsendable;
     use device::flash::drive::DriveError;
     use device::flash::image::ImageError;
     use device::flash::picoboot::WriteError;
-    use device::forms::Unsendable;
     use device::printers::PrintersError;
     use device::transit::RunError;
     use device::transit::journal::JournalError;

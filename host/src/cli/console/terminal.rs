@@ -12,7 +12,7 @@ use protocol::link::message::JobKind;
 use super::stderr;
 use crate::cli::output;
 use device::deliver::{Caller, Cartridges, News, Question};
-use device::forms::PassPlace;
+use device::encodings::PassPlace;
 use device::printers::Printer;
 use device::questions::cartridges::Found;
 use device::transit::journal::Entry;

@@ -13,7 +13,7 @@ use crate::cli::console::{show, stderr};
 use crate::cli::output::{self, Staged};
 use device::connection::{Address, Destination};
 use device::deliver::{Delivery, Ended, Failure, Job, Packed, find_cartridges};
-use device::forms::{self, Content};
+use device::encodings::{self, Content};
 use device::printers::Printers;
 use device::transit::finish::Sheet;
 use device::transit::journal::{Journal, OpenJob};
@@ -59,7 +59,7 @@ impl DeliverArgs {
             Some(to) => to,
         };
         let name = &job.draft.plan.document;
-        let checked = forms::check(&job.bytes, observer)?;
+        let checked = encodings::check(&job.bytes, observer)?;
         if let Destination::Bridge(address) = to {
             let cartridges = find_cartridges(address, &checked.inks, &Printers::of_system()?);
             show(&format!("{}\n", cartridges_text(&cartridges, checked.by_hand)))?;

@@ -1,4 +1,5 @@
-//! From what was made to where it goes: the folder of a print, the plan on the terminal, and the way to the printer.
+//! From what was made to where it goes: the folder of a print, the plan on the terminal, and the way to the
+//! printer.
 
 pub mod cut_lines;
 pub mod deliver;
@@ -109,7 +110,8 @@ impl Places {
         Ok(Places { target, folder, also })
     }
 
-    /// Writes what every print has: the job, its passes, pictures and pages. Returns the folder, which has another name yet.
+    /// Writes what every print has: the job, its passes, pictures and pages. Returns the folder, which has
+    /// another name yet.
     pub fn write(&self, made: &Made, observer: &dyn Observer) -> Result<PathBuf> {
         let folder = self.folder.create()?.to_path_buf();
         write(&folder.join("job.rgl"), &made.job.bytes)?;
@@ -136,7 +138,8 @@ impl Places {
     }
 
     /// Writes the report, makes everything appear, shows the plan and sends the job. `more` is what else the report
-    /// holds (an object, or null for nothing), `advice` what else to say below the plan, and `picture` the file to look at.
+    /// holds (an object, or null for nothing), `advice` what else to say below the plan, and `picture` the
+    /// file to look at.
     pub fn finish(
         self,
         made: &Made,

@@ -128,8 +128,8 @@ impl Bench {
         self.bridge.figures().unwrap()["now"].as_f64().unwrap() / 1e9
     }
 
-    /// Waits until nothing has crossed the port for a fifth of a second of the board's time, in which it sends kilobytes; how
-    /// much has crossed until then.
+    /// Waits until nothing has crossed the port for a fifth of a second of the board's time, in which it
+    /// sends kilobytes; how much has crossed until then.
     fn rests(&mut self) -> usize {
         let start = Instant::now();
         let (mut since, mut printed) = (self.clock(), self.printed());

@@ -255,8 +255,8 @@ impl Bench {
     /// Puts a job into the journal, as a `send` does that is interrupted right behind it.
     fn wait_on_disk(&self) -> u32 {
         let job = fs::read(self.path("job.rgl")).unwrap();
-        let checked = device::forms::check(&job, &Silent).unwrap();
-        let streams = device::forms::streams::of_bytes(&job, &Silent).unwrap();
+        let checked = device::encodings::check(&job, &Silent).unwrap();
+        let streams = device::encodings::streams::of_bytes(&job, &Silent).unwrap();
         let journal = Journal::at(&self.path("user-0/jobs")).unwrap();
         let queued = journal.queue(NewJob {
             name: "leaf",
@@ -343,7 +343,7 @@ impl Bench {
             KilledBeforeTheFirstByte | KilledInARow => run.kill(),
             KilledAtTheEnd => {
                 // The bridge takes all of a job this small, and finishes the sheet by itself.
-                let all = device::forms::streams::of_bytes(&self.job(), &Silent).unwrap().len();
+                let all = device::encodings::streams::of_bytes(&self.job(), &Silent).unwrap().len();
                 self.until("the bridge has all of it", &mut run, |bench, _| {
                     bench.bridge.port.progress().is_some_and(|progress| progress.accepted as usize == all)
                 });

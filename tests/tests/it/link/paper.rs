@@ -4,7 +4,7 @@ use super::EVERYTHING;
 use super::wire::{self, World};
 use appearance::document::{self, Options};
 use appearance::{factor, gamut};
-use device::forms::streams;
+use device::encodings::streams;
 use device::transit::session::Outcome;
 use model::{ALL, Job, seeded};
 use observe::Silent;

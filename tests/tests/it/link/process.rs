@@ -2,7 +2,7 @@
 
 use device::connection::Address;
 use device::connection::transport::{Transport, pair};
-use device::forms::{self, streams};
+use device::encodings::{self, streams};
 use device::questions::query::{Query, QueryError, Reply};
 use device::questions::status::Status;
 use device::transit;
@@ -87,7 +87,7 @@ impl Bench {
 
     /// Puts the job into the journal.
     fn queue(self, kind: JobKind) -> Bench {
-        let checked = forms::check(&self.job, &Silent).unwrap();
+        let checked = encodings::check(&self.job, &Silent).unwrap();
         let streams = streams::of_bytes(&self.job, &Silent).unwrap();
         Journal::at(&self.jobs())
             .unwrap()

@@ -180,7 +180,8 @@ fn a_sheet_whose_job_is_held_is_ended_for_no_other_job() {
     interrupted.set("state", "held".into());
     let serving = interrupted.again();
     let next = ipp::print(serving.address, "standard", "next", &job(3)).unwrap();
-    // The printing thread looks for work as soon as a job is there; fifty answers later it would have begun this one.
+    // The printing thread looks for work as soon as a job is there; fifty answers later it would have begun
+    // this one.
     for _ in 0..50 {
         assert_eq!(ipp::state(serving.address, next).unwrap(), 3);
     }

@@ -14,10 +14,11 @@ use super::settings::SETTINGS;
 use crate::document::error::{DocumentError, list};
 use crate::document::source::Source;
 
-/// How many levels below the folder are searched.
+/// How many levels below the folder are searched: texture sets lie in one or two, and a home folder must not
+/// be walked.
 const DEPTH: usize = 3;
 
-/// The most folders that are looked into.
+/// The most folders that are looked into, so that a wrong path ends with a message and not after minutes.
 const MOST_FOLDERS: usize = 1000;
 
 /// What there is to open.

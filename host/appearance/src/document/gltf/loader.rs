@@ -10,9 +10,10 @@ use percent_encoding::percent_decode_str;
 
 use super::root::{Info, Root};
 use crate::document::content::ColourSpace;
+use crate::document::content::MOST_BYTES;
 use crate::document::error::DocumentError;
 use crate::document::picture::Picture;
-use crate::document::source::{MOST_BYTES, Source};
+use crate::document::source::Source;
 use crate::document::texture::Field;
 
 /// The placement of a map on the surface: offset, rotation, scale, set of coordinates.

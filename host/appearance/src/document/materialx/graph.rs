@@ -13,10 +13,10 @@ use roxmltree::Node;
 use crate::document::error::DocumentError;
 use crate::document::picture::Encoding;
 
-/// The most nodes of the document's tree.
+/// The most nodes of the document's tree: far more than any graph of materials, few enough for hostile files.
 pub(super) const MOST_NODES: u32 = 200_000;
 
-/// The most steps from an input to its picture.
+/// The most steps from an input to its picture, so that a graph that refers to itself ends.
 const DEEPEST: usize = 32;
 
 /// A document and its place.

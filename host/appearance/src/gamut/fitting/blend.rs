@@ -20,7 +20,7 @@ use crate::weights::{ONE, WeightMaps, quantise};
 /// The distance up to which a clamped pixel counts as in the gamut, and the one from which it counts as far outside.
 const INVISIBLE: f32 = 0.01;
 const OBVIOUS: f32 = 0.05;
-/// Pixels per parallel task.
+/// Pixels per parallel task: enough work for a thread, and many tasks so that no thread waits for another.
 const RUN: usize = 1024;
 /// Half the window of the filter, in pixels, and the difference in brightness that counts as an edge.
 const RADIUS: usize = 8;

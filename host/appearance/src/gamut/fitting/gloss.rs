@@ -9,12 +9,15 @@
 use crate::brdf::{Space, Table};
 use maths::Maths;
 
-/// Two rows differ if their distance exceeds this.
+/// Two rows differ if their distance exceeds this: three times what is barely visible
+/// (decisions/clamp-and-seven-cartridges.md).
 pub(crate) const DIFFERENT: f64 = 0.03;
-/// Two rows that differ are merged if they are printed at less than this share of their distance.
+/// Two rows that differ are merged if they are printed at less than this share of their distance
+/// (decisions/clamp-and-seven-cartridges.md).
 pub(crate) const MERGED: f64 = 0.25;
 
-/// Share of merged pairs of materials up to which nothing need be done about them.
+/// Share of merged pairs of materials up to which nothing need be done about them
+/// (decisions/clamp-and-seven-cartridges.md).
 pub(crate) const FEW_MERGED: f64 = 0.01;
 
 /// The share of pairs of materials that are different bases printed alike, where each basis has its share of the document.

@@ -33,17 +33,23 @@ use crate::gamut::sample;
 use crate::materials::Materials;
 use crate::weights::quantise;
 
-/// The weight of contrast, mu.
+/// The weight of contrast, mu: 4 keeps less of it, 32 hardly more and costs distance
+/// (decisions/contrast-between-neighbours.md).
 const CONTRAST: f64 = 16.0;
 /// Sweeps over a part of the pixels, and how many pixels one stands for: means over a window need no more. A last sweep
 /// solves all.
 const SWEEPS: u32 = 5;
+/// How many pixels one of a sweep stands for: the means over a window of 32 x 32 need no more.
 const EVERY: u32 = 4;
-/// The distance up to which the clamped mixture stays, and the one from which a pixel moves freely.
+/// The distance up to which the clamped mixture stays bit for bit (decisions/contrast-between-neighbours.md):
+/// half of what is barely visible.
 const EXACT: f64 = 0.005;
+/// The distance from which a pixel moves freely (decisions/contrast-between-neighbours.md): twice what is
+/// barely visible.
 const FREE: f64 = 0.02;
 /// Pixels by which the kinds of materials are found, and the seed of their choice.
 const SAMPLE: usize = 1024;
+/// The seed of the choice of that sample: any would do, as long as it is the same each time.
 const SEED: u64 = 1;
 
 /// Replaces the clamped mixtures of pixels outside the gamut, and their distances, by those that keep contrast. Returns the

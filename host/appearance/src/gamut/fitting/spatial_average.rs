@@ -23,13 +23,16 @@ use crate::materials::Materials;
 use crate::solve::Target;
 use crate::weights::{ONE, quantise};
 
-/// Sweeps. A third lowers the difference by another percent of itself and takes pixels farther away.
+/// Sweeps, as measured in decisions/what-the-eye-averages.md: a third lowers the difference by another
+/// percent of itself and takes pixels farther away.
 const SWEEPS: u32 = 2;
-/// The shift, in distance, below which a pixel stays.
+/// The shift, in distance, below which a pixel stays bit for bit, for nobody sees it
+/// (decisions/what-the-eye-averages.md).
 const FELT: f64 = 0.002;
 /// The most cells: their rows then take 160 MB.
 const MOST_CELLS: usize = 1 << 17;
-/// The smallest spot in pixels over which there is anything to average.
+/// The smallest spot in pixels over which there is anything to average: below it a spot is not much more than
+/// the pixel itself, which clamping fits already.
 const LEAST: f64 = 2.0;
 
 /// Moves clamped pixels of a document, of which `spot` pixels make a side of the square that the eye averages over. Returns the

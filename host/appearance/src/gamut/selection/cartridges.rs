@@ -82,9 +82,9 @@ pub(crate) fn choose(
     Ok(Cartridges { stacks: stacks_of(candidates, inks), inks, given_up, all, chosen })
 }
 
-/// The part of a distance that is not worth a cartridge.
+/// The part of a distance that is not worth a cartridge (decisions/clamp-and-seven-cartridges.md).
 const SPARED: f64 = 0.01;
-/// What reports show as 0.0000.
+/// What reports show as 0.0000, so that nobody can tell it from nothing.
 const SHOWN: f64 = 5e-5;
 
 /// Whether a distance is no worse than another for what is seen: within 1 % of it, or shown as equal.

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::gamut::candidates::Candidates;
 use crate::solve::{Hull, Mixer, MixtureError, Target};
 
-/// Gap in squared distance that decides nothing.
+/// Gap in squared distance that decides nothing: a hundredth of what is barely visible, squared.
 const ENOUGH: f64 = 1e-8;
 
 /// The weight that must be left of a mixture for it to be a start; the tangent start costs a product of every two stacks.

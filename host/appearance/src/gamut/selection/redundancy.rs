@@ -128,8 +128,8 @@ mod tests {
     use crate::solve::{Columns, Gram, Simplex};
     use inks::{InkSet, Library};
 
-    /// The squared distance of a row to the convex hull of others in plain reflectance, by one quadratic: zero if and only
-    /// if the row is a mixture.
+    /// The squared distance of a row to the convex hull of others in plain reflectance, by one quadratic:
+    /// zero if and only if the row is a mixture.
     fn outside(rows: &Table, row: usize) -> f64 {
         let others: Vec<usize> = (0..rows.len()).filter(|&k| k != row).collect();
         let mut hull = Table::new(rows.columns());

@@ -12,13 +12,14 @@ use super::fitted::{Fitted, Targets};
 use crate::gamut::candidates::Candidates;
 use crate::solve::MixtureError;
 
-/// The most stacks beyond the usual ones, and the share of the document from which one is worth it.
+/// The most stacks beyond the usual ones (decisions/metric-that-knows-light.md).
 const MOST_EXTRA: usize = 24;
+/// The share of the document from which a stack is worth it (decisions/metric-that-knows-light.md).
 const WORTH: f64 = 0.002;
 
 /// How much the mean squared distance may grow for the sake of stacks that print well: 1 % of the distance.
 const SLACK: f64 = 1.01 * 1.01;
-/// The growth that nobody sees, in squared distance.
+/// The growth that nobody sees, in squared distance: a hundredth of what is barely visible, squared.
 const UNSEEN: f64 = 1e-8;
 
 /// Which of the stacks `allowed` to mix from.

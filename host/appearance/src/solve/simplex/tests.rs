@@ -133,8 +133,9 @@ proptest! {
         prop_assert!(certificate.steps < most_steps(a.len()) / 2, "{certificate:?}");
     }
 
-    /// The nearest point y of a hull is the one at which no point e of the hull lies on the target's side: for y - t = r,
-    /// r.(e - y) >= 0 for all of them, and for no other point of the hull. Counted from the points themselves.
+    /// The nearest point y of a hull is the one at which no point e of the hull lies on the target's side:
+    /// for y - t = r, r.(e - y) >= 0 for all of them, and for no other point of the hull. Counted from the
+    /// points themselves.
     #[test]
     fn no_point_of_the_hull_lies_on_the_targets_side((rows, t) in problem()) {
         let rows = table(&rows);

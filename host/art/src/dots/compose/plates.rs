@@ -20,7 +20,7 @@ use halftone::green_noise::{SIDE, Table};
 use observe::Diagnosis;
 use sheet::{Plane, pack};
 
-/// Plates that are picked together, one for each process ink.
+/// Plates that are picked together: one for each process ink, so that no set needs more.
 pub(super) const MOST: usize = 4;
 /// Sets of plates, a bit each.
 const SETS: usize = 1 << MOST;

@@ -9,7 +9,8 @@ use protocol::rgl::Media;
 
 use super::separation::{COLOURS, InkLayer};
 
-/// An ink is not worth a pass on fewer dots of a picture's colours than one in this many.
+/// An ink is not worth a pass on fewer dots of a picture's colours than one in this many, for a pass takes
+/// minutes and ribbon over the whole length.
 const RARE: u64 = 1000;
 
 /// An addition to the art that a user can accept.

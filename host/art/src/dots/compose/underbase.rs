@@ -15,7 +15,7 @@ use crate::read::size::MM;
 use sheet::Plane;
 use sheet::forest::Forest;
 
-/// The most that white is choked or spread, in mm.
+/// The most that white is choked or spread, in mm: more would be a mistake of units.
 pub const MOST_CHOKE_MM: f64 = 10.0;
 
 /// Where white comes from that the art does not draw.

@@ -72,10 +72,10 @@ const JBIG2: &str = "jbig2dec FATAL ERROR";
 /// The families that every reader has a stand-in for: those of the standard.
 const STANDARD: [&str; 5] = ["Helvetica", "Times", "Courier", "Symbol", "ZapfDingbats"];
 
-/// The most fonts that a note names.
+/// The most fonts that a note names, so that it stays a few lines.
 const FONTS: usize = 8;
 
-/// The longest quote, in characters.
+/// The longest quote, in characters, so that it stays a line or two.
 const LONGEST: usize = 120;
 
 /// Why no page of a document was drawn, or not the one of this number.

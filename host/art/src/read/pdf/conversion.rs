@@ -23,7 +23,7 @@ use readers::profile::{self, Table};
 /// Nodes on each axis of the table from CMYK, at whole steps of 8 bits, and of that to CMYK.
 const NODES: usize = 16;
 const NODES_OF_LAB: usize = 33;
-/// Entries of a curve.
+/// Entries of a curve: one for each value of 8 bits, so that none lies between two.
 const ENTRIES: usize = 256;
 
 /// Ghostscript's options. Its process must run in the folder that has the files: it ends their names at a space.

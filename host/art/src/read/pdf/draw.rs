@@ -25,7 +25,7 @@ use observe::Diagnosis;
 /// Resolution of drafts.
 pub(super) const DRAFT: f64 = 36.0;
 
-/// What a size is rounded by that only the draft tells.
+/// What a size is rounded by that only the draft tells: a pixel of it, which cannot be told closer.
 const ROUNDED_MM: f64 = 25.4 / DRAFT;
 
 /// Has Ghostscript say the size of each page in points at its end: a draft rounds it to its own pixels.

@@ -16,10 +16,11 @@ use flate2::read::ZlibDecoder;
 
 use crate::read::names;
 
-/// The most bytes of a document, and of its expanded object streams, that are looked at.
+/// The most bytes of a document, and of its expanded object streams, that are looked at, as memory must hold
+/// them; beyond it only a note is missing.
 const MOST_BYTES: u64 = 1 << 26;
 
-/// The most layers that a note names.
+/// The most layers that a note names, so that it stays a few lines.
 const LISTED: usize = 8;
 
 /// A layer.

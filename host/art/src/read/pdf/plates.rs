@@ -38,7 +38,7 @@ use crate::window::Window;
 use files::scratch::Scratch;
 use observe::{Diagnosis, Observer};
 
-/// Full ink in what Ghostscript says of a spot.
+/// Full ink in what Ghostscript says of a spot. Source: `frac_1` in Ghostscript's `gxfrac.h`, 0x7ff8.
 const FULL: f64 = 32760.0;
 
 /// What becomes of a spot.

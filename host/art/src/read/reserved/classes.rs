@@ -7,11 +7,13 @@
 
 use rayon::prelude::*;
 
-/// Class of bare paper. Other classes are places in the list of reserved colours, from 1, or [`OTHER`].
+/// Class of bare paper. Other classes are places in the list of reserved colours, which must begin at 1, or
+/// [`OTHER`].
 pub(super) const PAPER: u8 = 0;
 /// Class of all colours that are not reserved.
 pub(super) const OTHER: u8 = u8::MAX;
-/// Marks the class of a pixel that may be the edge of two others. [`OTHER`] has it.
+/// Marks the class of a pixel that may be the edge of two others. [`OTHER`] has it. The highest bit, so that
+/// places in the list have the others.
 pub(super) const LOOSE: u8 = 0x80;
 
 /// Pixels in a block.

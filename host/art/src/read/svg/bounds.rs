@@ -14,10 +14,11 @@ use resvg::usvg::{self, roxmltree};
 
 use super::nodes::{self, Node};
 
-/// How deep elements may lie in each other, and in what they refer to.
+/// How deep elements may lie in each other, and in what they refer to, so that hostile drawings do not fill
+/// the stack.
 pub(super) const MOST_DEEP: usize = 512;
 
-/// The most elements that are drawn.
+/// The most elements that are drawn, so that a hostile drawing of uses of uses ends.
 pub(super) const MOST_DRAWN: f64 = 2e6;
 
 /// The most bytes of pixels that exist at the same time while a drawing is rendered: a page of 600 dpi with five layers as large.

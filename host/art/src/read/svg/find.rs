@@ -25,10 +25,10 @@ use observe::Diagnosis;
 /// The most layers that are looked for: more than a sheet can have.
 const MOST_LAYERS: usize = 64;
 
-/// The most parts that a note lists by name.
+/// The most parts that a note lists by name, so that it stays a few lines.
 const LISTED: usize = 12;
 
-/// The most letters of a text that a note quotes.
+/// The most letters of a text that a note quotes, so that a dozen of them stay a few lines.
 const QUOTED: usize = 24;
 
 /// A layer of ink: one or several elements.

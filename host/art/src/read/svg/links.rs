@@ -18,11 +18,19 @@ use percent_encoding::percent_decode_str;
 use readers::Flaw;
 use resvg::usvg::{ImageHrefResolver, ImageKind};
 
-use super::render::Without;
 use super::{MOST_BYTES, bounds, source};
 
 /// The most pixels of a picture in a drawing: twice a page at 600 dpi.
 const MOST_PIXELS: u64 = 1 << 26;
+
+/// What is left out of a rendering.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Without {
+    Nothing,
+    Text,
+    /// Pictures made of pixels.
+    Pictures,
+}
 
 /// What the renderer met in a drawing.
 #[derive(Default)]

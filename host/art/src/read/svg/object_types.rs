@@ -6,7 +6,8 @@
 
 use crate::read::object_type::{BYTES, ObjectType};
 
-/// A rendered drawing on white, with the kind of each pixel ([`object_type`](crate::read::object_type)); what is transparent has no kind.
+/// A rendered drawing on white, with the kind of each pixel ([`object_type`](crate::read::object_type)); what
+/// is transparent has no kind.
 /// `rgba` is the drawing in straight alpha, `no_text` and `no_pictures` are the same without these, if it has any.
 pub(crate) fn tagged(rgba: &[u8], no_text: Option<&[u8]>, no_pictures: Option<&[u8]>) -> Vec<u8> {
     let mut pixels = vec![0; rgba.len()];

@@ -15,18 +15,9 @@ use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg;
 
 use super::fonts::{DEFAULT, Fonts};
-use super::links::{Known, Met};
+use super::links::{Known, Met, Without};
 use super::{bounds, links, thin};
 use crate::error::wrong;
-
-/// What is left out of a rendering.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Without {
-    Nothing,
-    Text,
-    /// Pictures made of pixels.
-    Pictures,
-}
 
 /// Renders drawings from one file.
 pub(super) struct Renderer {

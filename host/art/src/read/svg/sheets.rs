@@ -14,7 +14,7 @@ use simplecss::{AttributeOperator, Element, PseudoClass, Selector};
 
 use super::nodes::Node;
 
-/// How deep media rules may lie in each other.
+/// How deep media rules may lie in each other, so that hostile sheets do not fill the stack.
 const MOST_DEEP: usize = 8;
 
 /// The longest selector that is read: a reader without bounds calls itself for each part.

@@ -15,7 +15,7 @@ use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 use crate::error::wrong;
 use observe::Diagnosis;
 
-/// How far into a file its first element is looked for.
+/// How far into a file its first element is looked for: enough for any declaration and comment before it.
 const PROLOG: u64 = 1 << 20;
 
 /// Whether a file is an SVG drawing; `start` holds its first bytes.

@@ -24,10 +24,10 @@ use super::values::{self, Value, understood};
 use super::write;
 use crate::error::wrong;
 
-/// The most parts that a note lists.
+/// The most parts that a note lists, so that it stays a few lines.
 const LISTED: usize = 12;
 
-/// The most letters of a value that a note quotes.
+/// The most letters of a value that a note quotes, so that it stays a line.
 const QUOTED: usize = 60;
 
 /// Attributes whose values are looked at.

@@ -15,7 +15,7 @@ use resvg::usvg::{self, roxmltree::Document};
 use super::bounds::urls;
 use super::nodes::{self, Node};
 
-/// The most parts that a note lists.
+/// The most parts that a note lists, so that it stays a few lines.
 const LISTED: usize = 12;
 
 /// Elements that are known and drawn only where something refers to them, or not at all.

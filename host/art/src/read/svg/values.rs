@@ -16,10 +16,10 @@ use svgtypes::{Color, Length, Paint, Transform};
 
 use super::sheets::{closed, is_whole, parts};
 
-/// The most variables that are replaced in one value.
+/// The most variables that are replaced in one value, so that those that name each other end.
 const MOST_REPLACED: usize = 64;
 
-/// The longest value that variables make.
+/// The longest value that variables make, so that those that double each other do not fill memory.
 const MOST_LONG: usize = 1 << 16;
 
 /// A value that is understood.

@@ -1,5 +1,7 @@
 use super::*;
 use observe::Silent;
+use readers::Exif;
+use std::path::Path;
 
 /// A scene of discs on shaded ground, as a camera with shot noise would record it.
 fn photograph(folder: &Path, name: &str, time: f64, scene: f64, shift: (i64, i64), gamma: bool) -> Exposure {

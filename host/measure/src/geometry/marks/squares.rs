@@ -10,7 +10,8 @@ use crate::geometry::grey::Grey;
 
 /// Darker than this part of the mean is dark.
 const DARK: f32 = 0.75;
-/// The smallest side of a mark in pixels.
+/// The smallest side of a mark in pixels: eight cells with its frame, so that each has three and a half to be
+/// read from.
 const SMALLEST: f64 = 28.0;
 
 /// Sums over rectangles in four additions (Crow 1984).

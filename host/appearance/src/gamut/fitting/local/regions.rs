@@ -13,11 +13,14 @@
 use crate::brdf::Table;
 use maths::Maths;
 
-/// Distance between nodes in pixels. A window is two cells wide.
+/// Distance between nodes in pixels. A window is two cells wide: 32 pixels
+/// (decisions/contrast-between-neighbours.md).
 pub(super) const CELL: usize = 16;
-/// Materials that differ by more than this (in d) are of different kinds.
+/// Materials that differ by more than this (in d) are of different kinds
+/// (decisions/contrast-between-neighbours.md).
 const APART: f64 = 0.2;
-/// How gradually a material passes from one kind to another (standard deviation, in d).
+/// How gradually a material passes from one kind to another (standard deviation, in d), so that kinds
+/// [`APART`] from each other hardly share one (decisions/contrast-between-neighbours.md).
 const BLUR: f64 = 0.07;
 /// The most kinds in a document.
 const MOST_KINDS: usize = 8;

@@ -361,7 +361,7 @@ mod tests {
         let mut plain = job.clone();
         plain.splice(from..from + 8, data.iter().copied());
         plain[at + 3] = 0;
-        assert!(crate::forms::check(&plain, &Silent).is_ok(), "legal all the same");
+        assert!(crate::encodings::check(&plain, &Silent).is_ok(), "legal all the same");
         assert_eq!(of_bytes(&plain, &Silent), None);
         assert_eq!(of_bytes(b"text", &Silent), None);
         assert_eq!(of_bytes(b"", &Silent), None);
@@ -377,7 +377,7 @@ mod tests {
         put(writer.next_pass(&mut out).unwrap(), &out);
         put(writer.row(&[1, 2, 3], &mut out).unwrap(), &out);
         put(writer.end(&mut out).unwrap(), &out);
-        assert!(crate::forms::check(&job, &Silent).is_ok());
+        assert!(crate::encodings::check(&job, &Silent).is_ok());
         assert_eq!(of_bytes(&job, &Silent), None);
     }
 

@@ -1,4 +1,5 @@
-//! The forms of a job: passes, bytes in the printer's language, and the pass streams a bridge makes the same bytes of.
+//! The encodings of a job: passes, bytes in the printer's language, and the pass streams a bridge makes the
+//! same bytes of.
 //!
 //! Only a whole legal job is sent, whatever its [`Content`]: its bytes are [checked](check()) before the first one leaves.
 //! [`streams`] codes it for the cable.
