@@ -27,6 +27,9 @@ const SKIPS: &str = "FOILPRESS_SKIPS";
 /// What is built for itself, besides the workspace of all others.
 const WORKSPACES: [&str; 3] = ["bridge/firmware", "tests/rig/firmware", "fuzz"];
 
+/// The machine of browsers.
+const BROWSER: &str = "wasm32-unknown-unknown";
+
 /// Tests whose times are shown.
 const SLOWEST: usize = 10;
 
@@ -77,6 +80,10 @@ pub fn run(root: &Path, is_full: bool) -> ExitCode {
         });
         // Every step builds for the same packages, so that nothing is built twice with other features.
         gate.step("building the tests, with lints", || runner.build());
+        // From a document's bytes to a job's bytes nothing needs a system: `make` and all that it uses.
+        gate.step("library for browsers", || {
+            succeed(&mut cargo(&["check", "--locked", "--package", "foilpress-make", "--target", BROWSER]))
+        });
         if is_full {
             gate.step("lints for macOS and Windows", || foreign::lint(root));
             gate.step("documentation of programs", || {
@@ -113,8 +120,8 @@ fn bring(root: &Path, gate: &Gate) -> Vec<(&'static str, std::ffi::OsString)> {
     if let Err(error) = queue::install() {
         eprintln!("print queues and PDF: {error:#}");
     }
-    gate.step("bare-metal targets", || {
-        succeed(&mut command("rustup", &[&["target", "add"][..], &BARE_METAL].concat()))
+    gate.step("targets of boards and browsers", || {
+        succeed(&mut command("rustup", &[&["target", "add", BROWSER][..], &BARE_METAL].concat()))
     });
     let browser = gate.step("browser and its scripts", || preview::bring(root));
     let emulator = gate.step("firmware with its lints, and emulator", || emulator::bring(root));
