@@ -509,7 +509,10 @@ pub static GAMMA: PageOption = PageOption {
         name: "Exponent",
         text: "Gamma, 0.2 to 5, such as 1.2",
         is: "a number from 0.2 to 5, such as 1.2",
-        set: |c, text| Some(c.gamma = text.parse().ok().filter(|gamma| GAMMAS.contains(gamma))?),
+        set: |c, text| {
+            c.gamma = text.parse().ok().filter(|gamma| GAMMAS.contains(gamma))?;
+            Some(())
+        },
     }),
 };
 
@@ -564,7 +567,10 @@ pub static POSITION: PageOption = PageOption {
         name: "Corner",
         text: "Top left corner of the drawing, such as 20x30mm",
         is: "the top left corner of the drawing, such as 20x30mm",
-        set: |c, text| Some(c.place = Place::At(text.parse().ok()?)),
+        set: |c, text| {
+            c.place = Place::At(text.parse().ok()?);
+            Some(())
+        },
     }),
 };
 
@@ -597,7 +603,8 @@ pub static TOLERANCE: PageOption = PageOption {
         text: "Steps of red, green and blue, 0 to 60",
         is: "a number of steps from 0 to 60, such as 12",
         set: |c, text| {
-            Some(c.tolerance = Some(text.parse().ok().filter(|steps| TOLERANCES.contains(steps))?))
+            c.tolerance = Some(text.parse().ok().filter(|steps| TOLERANCES.contains(steps))?);
+            Some(())
         },
     }),
 };
