@@ -6,18 +6,12 @@
 //! is printed. A chip that never ends an operation is met by the watchdog, and from then on, until the supply goes, the board works
 //! without a store: otherwise each start could begin the same operation again.
 
-use crate::board::{self, FLASH};
+use crate::board::{self, FLASH, Whole};
 use crate::{retained, trace};
 use bridge::store::{Flash as Chip, SECTOR};
 use embassy_rp::Peri;
-use embassy_rp::flash::{Blocking, Flash};
+use embassy_rp::flash::Flash;
 use embassy_rp::peripherals;
-
-/// The largest chip: 16 MiB, which is as much as the processor sees.
-const MOST: usize = 16 << 20;
-
-/// The flash of the board.
-pub type Whole = Flash<'static, peripherals::FLASH, Blocking, MOST>;
 
 /// Takes the flash.
 pub fn take(flash: Peri<'static, peripherals::FLASH>) -> Whole {

@@ -15,7 +15,12 @@ pub fn decode(v: f32) -> f32 {
 /// The encoded value of a linear one; both are 0 to 1, and values outside are clamped.
 pub fn encode(v: f32) -> f32 {
     let v = v.clamp(0.0, 1.0);
-    if v <= 0.003_130_8 { 12.92 * v } else { v.power((1.0 / 2.4f64) as f32) * 1.055 - 0.055 }
+    if v <= 0.003_130_8 {
+        12.92 * v
+    } else {
+        // In `f32` these two numbers would make white a little less than 1.
+        (f64::from(v.power((1.0 / 2.4f64) as f32)) * 1.055 - 0.055) as f32
+    }
 }
 
 #[cfg(test)]

@@ -1,5 +1,8 @@
 //! Options of the readers of art.
 
+use std::sync::Arc;
+
+use files::shelf::{Disk, Shelf};
 use inks::InkSet;
 use protocol::ink::Ink;
 
@@ -9,7 +12,7 @@ use sheet::Size;
 pub const TOLERANCES: std::ops::RangeInclusive<u8> = 0..=60;
 
 /// How to read art.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Options {
     /// Size on paper; overrides the size in the file.
     pub size: Option<Size>,
@@ -35,6 +38,8 @@ pub struct Options {
     pub keep_white: bool,
     /// Room on the page: art without a size of its own is fitted to it.
     pub room: Room,
+    /// Where the files stand, and what a drawing links.
+    pub shelf: Arc<dyn Shelf>,
 }
 
 impl Options {
@@ -94,6 +99,7 @@ impl Default for Options {
             cut_lines: false,
             keep_white: false,
             room: Room::default(),
+            shelf: Arc::new(Disk),
         }
     }
 }

@@ -15,6 +15,7 @@ mod pages;
 mod pictures;
 mod plates;
 mod programs;
+mod shelves;
 mod sizes;
 mod styles;
 mod thin;

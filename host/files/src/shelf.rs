@@ -88,6 +88,28 @@ pub trait Shelf: Debug + Send + Sync {
         self.kind(path).is_ok_and(|kind| kind == Kind::File)
     }
 
+    /// A path without links, `.` and `..`, of something that stands there: what a document links may lead up
+    /// and down again, and a path without these tells where it ends.
+    ///
+    /// # Errors
+    /// As [`Shelf::kind`].
+    fn resolved(&self, path: &Path) -> io::Result<PathBuf> {
+        let mut found = PathBuf::new();
+        for part in path.components() {
+            match part {
+                Component::ParentDir if !found.pop() => return place(path),
+                Component::ParentDir | Component::CurDir => {}
+                part => found.push(part),
+            }
+        }
+        self.kind(&found).map(|_| found)
+    }
+
+    /// Whether other programs see these files by the same paths.
+    fn is_disk(&self) -> bool {
+        false
+    }
+
     /// Whether a folder stands at a path.
     fn is_folder(&self, path: &Path) -> bool {
         self.kind(path).is_ok_and(|kind| kind == Kind::Folder)
@@ -161,6 +183,14 @@ fn named(path: &Path) -> &Path {
 }
 
 impl Shelf for Disk {
+    fn resolved(&self, path: &Path) -> io::Result<PathBuf> {
+        named(path).canonicalize()
+    }
+
+    fn is_disk(&self) -> bool {
+        true
+    }
+
     fn kind(&self, path: &Path) -> io::Result<Kind> {
         fs::metadata(named(path)).map(|about| kind_of(&about))
     }
@@ -230,7 +260,7 @@ impl Memory {
     }
 }
 
-/// A path without `.`, as files are kept under.
+/// A path without `.`, as files are kept under; one with `..` is none.
 fn place(path: &Path) -> io::Result<PathBuf> {
     if path.components().any(|part| part == Component::ParentDir) {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "`..` leads out of the files in memory"));

@@ -5,14 +5,18 @@
 
 use std::path::PathBuf;
 
-use art::{Artwork, Composed, Remedy, Room};
+use art::{Artwork, Composed, Finish, Remedy, Room, White};
 use inks::{InkSet, Library};
 use observe::{Diagnosis, Observer};
+use press::job::Handling;
 use press::job::plan::Suggestion;
-use press::layout;
+use press::layout::{self, Layout};
 use press::pipeline::{self, Draft, Job, JobError, Request};
+use protocol::ink::{Ink, Kind};
+use protocol::paper::Paper;
 
 use crate::made::{Made, Subject};
+use crate::options::{Choices, Spots};
 use crate::{Error, PageSettings};
 
 /// How flat art is printed.
@@ -40,6 +44,57 @@ impl Default for Settings {
             library: Library::builtin(),
             page: PageSettings::default(),
             how: |_, _| String::new(),
+        }
+    }
+}
+
+impl Settings {
+    /// How art of a page is printed by these choices, on this sheet.
+    #[must_use]
+    pub fn of(choices: &Choices, paper: Paper, library: &Library) -> Settings {
+        let mut reserved = InkSet::EMPTY;
+        if choices.spots == Spots::Reserved {
+            reserved = art::Options::default().inks;
+        } else if choices.white == White::Reserved {
+            reserved = reserved.with(Ink::White);
+        }
+        let inks = Ink::ALL.into_iter().filter(|ink| match ink.kind() {
+            Kind::Process => choices.colours.contains(*ink),
+            Kind::Foil => choices.foils && choices.more.inks.contains(*ink),
+            _ => choices.more.inks.contains(*ink),
+        });
+        Settings {
+            read: art::Options {
+                dpi: Some(choices.dpi.into()),
+                reserved: !reserved.is_empty(),
+                inks: reserved,
+                colours: choices.inks_of.clone(),
+                tolerance: choices.tolerance,
+                ..art::Options::default()
+            },
+            compose: art::Settings {
+                inks: InkSet::of(inks),
+                // What the page itself draws in white or finish is printed whatever is chosen.
+                // Its reserved white is a layer of it, which `read` finds.
+                white: Some(choices.white).filter(|white| !matches!(white, White::None | White::Reserved)),
+                finish: Some(choices.finish).filter(|&finish| finish != Finish::None),
+                intent: choices.intent,
+                gamma: choices.gamma,
+                halftone: choices.halftone,
+                ..choices.more.clone()
+            },
+            library: library.clone(),
+            page: PageSettings {
+                layout: Layout {
+                    mirror: choices.mirror,
+                    cut: true,
+                    profile: choices.profile,
+                    ..Layout::centred(paper)
+                },
+                handling: Handling { media: choices.media, curl_correction: choices.curl_correction },
+                ..PageSettings::default()
+            },
+            ..Settings::default()
         }
     }
 }

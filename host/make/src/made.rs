@@ -6,6 +6,7 @@
 //! show the pictures. Cost: a page of pictures takes about as long as the job. Limits: the passes as data are
 //! [`press::separate::files`]' to write.
 
+use appearance::document::Document;
 use art::Report;
 use observe::Observer;
 use press::job::page::{self, Pictures};
@@ -18,7 +19,7 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 use sheet::{Area, Sheet};
 
-use crate::print::Seen;
+use crate::print::{Print, Seen, Settings};
 use crate::{Error, PageSettings};
 
 /// Pixels of the longer side of the sheet on the plan's page.
@@ -44,6 +45,27 @@ pub enum Subject {
     Layers(Box<Report>),
     /// A document, and what was seen of its print.
     Document(Box<Seen>),
+}
+
+impl Print {
+    /// The job of a document, proved on the simulated printer, with its plan.
+    ///
+    /// # Errors
+    /// Those of the stages, and rules that forbid the job.
+    pub fn of(document: Document, settings: &Settings, observer: &dyn Observer) -> Result<Made, Error> {
+        Print::new(document, settings, observer)?.made(observer)
+    }
+
+    /// The job, proved on the simulated printer.
+    ///
+    /// # Errors
+    /// Those of the stages, and rules that forbid the job.
+    pub fn made(self, observer: &dyn Observer) -> Result<Made, Error> {
+        let prove = |print: &Print| Made::proved(&print.request(), &print.settings.page, observer);
+        let (mut made, seen) = self.seen(prove, observer)?;
+        made.job.draft.plan.notes = seen.notes();
+        Ok(made.of(Subject::Document(Box::new(seen))))
+    }
 }
 
 impl Made {

@@ -12,14 +12,11 @@ use std::ops::RangeInclusive;
 
 use art::{Finish, GAMMAS, Intent, TOLERANCES, White};
 use halftone::Method;
-use inks::{InkSet, Library};
-use press::job::Handling;
-use press::layout::{Layout, Point, Profile};
+use inks::InkSet;
+use press::layout::{Point, Profile};
 use protocol::ink::{Ink, Kind};
 use protocol::paper::Paper;
 use protocol::rgl::Media;
-
-use crate::{PageSettings, layers};
 
 /// An option of a page.
 pub struct PageOption {
@@ -189,57 +186,6 @@ fn sheet(choices: &mut Choices, media: Media, curl_correction: bool) {
 /// The inks that mix colours.
 fn process() -> InkSet {
     InkSet::of(Ink::ALL.into_iter().filter(|ink| ink.kind() == Kind::Process))
-}
-
-impl Choices {
-    /// How art of a page is printed by these choices, on this sheet.
-    #[must_use]
-    pub fn settings(&self, paper: Paper, library: &Library) -> layers::Settings {
-        let mut reserved = InkSet::EMPTY;
-        if self.spots == Spots::Reserved {
-            reserved = art::Options::default().inks;
-        } else if self.white == White::Reserved {
-            reserved = reserved.with(Ink::White);
-        }
-        let inks = Ink::ALL.into_iter().filter(|ink| match ink.kind() {
-            Kind::Process => self.colours.contains(*ink),
-            Kind::Foil => self.foils && self.more.inks.contains(*ink),
-            _ => self.more.inks.contains(*ink),
-        });
-        layers::Settings {
-            read: art::Options {
-                dpi: Some(self.dpi.into()),
-                reserved: !reserved.is_empty(),
-                inks: reserved,
-                colours: self.inks_of.clone(),
-                tolerance: self.tolerance,
-                ..art::Options::default()
-            },
-            compose: art::Settings {
-                inks: InkSet::of(inks),
-                // What the page itself draws in white or finish is printed whatever is chosen.
-                // Its reserved white is a layer of it, which `read` finds.
-                white: Some(self.white).filter(|white| !matches!(white, White::None | White::Reserved)),
-                finish: Some(self.finish).filter(|&finish| finish != Finish::None),
-                intent: self.intent,
-                gamma: self.gamma,
-                halftone: self.halftone,
-                ..self.more.clone()
-            },
-            library: library.clone(),
-            page: PageSettings {
-                layout: Layout {
-                    mirror: self.mirror,
-                    cut: true,
-                    profile: self.profile,
-                    ..Layout::centred(paper)
-                },
-                handling: Handling { media: self.media, curl_correction: self.curl_correction },
-                ..PageSettings::default()
-            },
-            ..layers::Settings::default()
-        }
-    }
 }
 
 /// Whether a page, from 1, is among those to print.

@@ -28,7 +28,6 @@ use readers::Pixels;
 use serde_json::{Value, json};
 use sheet::Area;
 
-use crate::made::{Made, Subject};
 use crate::options::HALFTONE;
 use crate::shown::{Mixture, Shown};
 use crate::view::View;
@@ -92,14 +91,6 @@ pub struct Print {
 }
 
 impl Print {
-    /// The job of a document, proved on the simulated printer, with its plan.
-    ///
-    /// # Errors
-    /// Those of the stages, and rules that forbid the job.
-    pub fn of(document: Document, settings: &Settings, observer: &dyn Observer) -> Result<Made, Error> {
-        Print::new(document, settings, observer)?.made(observer)
-    }
-
     /// The dots of a document. What is known of two pictures on them is added to its notes.
     ///
     /// # Errors
@@ -136,18 +127,22 @@ impl Print {
         Ok(draft)
     }
 
-    /// The job, proved on the simulated printer.
+    /// What is seen of the print, and beside it what `job` makes of it.
     ///
     /// # Errors
-    /// Those of the stages, and rules that forbid the job.
-    pub fn made(mut self, observer: &dyn Observer) -> Result<Made, Error> {
+    /// Those of the stages, and of the job.
+    pub(crate) fn seen<J: Send>(
+        mut self,
+        job: impl FnOnce(&Print) -> Result<J, Error> + Send,
+        observer: &dyn Observer,
+    ) -> Result<(J, Seen), Error> {
         // Of a fine document the mixture takes the most memory. It is given back as soon as it was measured.
         let mix = self.halftoned.mapped.mix.take();
         let gloss = self.gloss();
         let (print, beside) = (&self, Beside(observer));
         // Some steps to a job are one thread's. What does not depend on it is looked at beside them.
-        let (proved, seen) = rayon::join(
-            || Made::proved(&print.request(), &print.settings.page, observer),
+        let (job, seen) = rayon::join(
+            || job(print),
             || {
                 rayon::join(
                     || print.fidelity(&beside),
@@ -163,13 +158,11 @@ impl Print {
                 )
             },
         );
-        let (mut proved, fidelity, (halftone, mixture)) = (proved?, seen.0?, seen.1?);
-        proved.job.draft.plan.notes = self.notes(&gloss);
-        let seen = Seen { print: self, gloss, fidelity, halftone, mixture, replay: String::new() };
-        Ok(proved.of(Subject::Document(Box::new(seen))))
+        let (job, fidelity, (halftone, mixture)) = (job?, seen.0?, seen.1?);
+        Ok((job, Seen { print: self, gloss, fidelity, halftone, mixture, replay: String::new() }))
     }
 
-    fn request(&self) -> Request<'_> {
+    pub(crate) fn request(&self) -> Request<'_> {
         let Settings { dots, library, page, .. } = &self.settings;
         page.request(&self.document.name, &self.halftoned.dots, dots.inks, library)
     }
@@ -290,6 +283,11 @@ pub struct Seen {
 }
 
 impl Seen {
+    /// What there is to say of the document beside the plan.
+    pub(crate) fn notes(&self) -> Vec<String> {
+        self.print.notes(&self.gloss)
+    }
+
     /// Document and print side by side, with the number of passes below.
     pub(crate) fn sheet(&self, passes: usize, observer: &dyn Observer) -> Result<Pixels<[u8; 3]>, Error> {
         let Print { document, settings, halftoned, contrasts } = &self.print;

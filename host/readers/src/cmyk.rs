@@ -18,7 +18,7 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 
 use crate::jpeg;
 use crate::picture::{Picture, Plane, PlaneKind, Process};
-use crate::read::{Request, whole_jpeg};
+use crate::request::{Request, whole_jpeg};
 use crate::resolution;
 use crate::turn::Turn;
 

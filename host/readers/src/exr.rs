@@ -10,7 +10,7 @@ use std::io::Cursor;
 use exr::meta::MetaData;
 use exr::prelude::{AnyChannel, FlatSamples, ReadChannels, ReadLayers};
 
-use crate::stored::Fault;
+use crate::fault::Fault;
 
 /// The chromaticities (x, y) of red, green, blue and white.
 pub type Primaries = [[f32; 2]; 4];

@@ -11,8 +11,8 @@ use ::tiff::tags::Tag;
 use image::metadata::Orientation;
 
 use crate::exr::Floats;
+use crate::fault::Fault;
 use crate::resolution::{TiffDecoder, tiff_decoder};
-use crate::stored::Fault;
 
 fn damaged(error: ::tiff::TiffError) -> Fault {
     Fault::Damaged(error.to_string())

@@ -17,7 +17,8 @@ use roxmltree::{Document, ParsingOptions};
 use zip::ZipArchive;
 
 use crate::picture::Picture;
-use crate::read::{Request, read, size};
+use crate::read::{read, size};
+use crate::request::Request;
 use crate::resolution::{Dpi, RESOLUTIONS};
 
 /// The most layers, and the most entries of an archive.

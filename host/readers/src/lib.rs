@@ -15,6 +15,7 @@ mod cmyk;
 pub mod exact;
 mod exif;
 mod exr;
+mod fault;
 mod floats;
 mod foreign;
 mod jpeg;
@@ -23,6 +24,7 @@ mod picture;
 mod pixels;
 pub mod profile;
 mod read;
+mod request;
 pub mod resolution;
 mod stored;
 mod tiff;
@@ -40,11 +42,13 @@ use image::{
 
 pub use exif::{Exif, exif};
 pub use exr::Primaries;
+pub use fault::Fault;
 pub use layered::{Layered, is_layered};
 pub use picture::{Picture, Plane, PlaneKind, Process, Raster};
 pub use pixels::{Pixel, Pixels, open_exr, png};
-pub use read::{Flaw, Request, flaw, is_picture, read, size};
-pub use stored::{Fault, Format, Header, Samples, Stored};
+pub use read::{Flaw, flaw, is_picture, read, size};
+pub use request::Request;
+pub use stored::{Format, Header, Samples, Stored};
 pub use tiff::pages::{count as pages, is_tiff};
 
 use chunks::{MOST_PROFILE, gamma};

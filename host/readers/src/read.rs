@@ -16,43 +16,10 @@ use image::{ImageError, ImageFormat, ImageReader};
 use observe::Diagnosis;
 
 use crate::picture::{Picture, Raster};
+use crate::request::{CUT_SHORT, Request, reduced, whole_jpeg};
 use crate::resolution;
 use crate::turn::Turn;
 use crate::{Bounds, cmyk, foreign, jpeg, tiff};
-
-/// What to read of a picture, and how large it may be.
-#[derive(Clone, Copy)]
-pub struct Request<'a> {
-    /// The page of a file with several, from 1; the first if none is chosen.
-    pub page: Option<u32>,
-    /// Whether an extra channel of this name is wanted as a plane. Process plates become planes, too. Without
-    /// it the picture has colours only.
-    pub planes: Option<&'a dyn Fn(&str) -> bool>,
-    /// The most pixels.
-    pub pixels: u64,
-    /// What has so many pixels, in words.
-    pub room: &'static str,
-    /// Formats that the caller reads by other means, in words.
-    pub besides: &'static str,
-}
-
-impl Request<'_> {
-    /// Refuses absurd sizes before anything is allocated.
-    ///
-    /// # Errors
-    /// No pixel, or more than allowed.
-    pub fn check(&self, name: &Path, (width, height): (u32, u32)) -> Result<(), Diagnosis> {
-        if width == 0 || height == 0 {
-            let problem = format!("the picture is {width} x {height} pixels; expected at least one");
-            return Err(Diagnosis::of_file(name, problem));
-        }
-        if u64::from(width) * u64::from(height) > self.pixels {
-            let problem = format!("the picture is {width} x {height} pixels, more than {}", self.room);
-            return Err(Diagnosis::of_file(name, problem).hint("make it smaller"));
-        }
-        Ok(())
-    }
-}
 
 /// How much of a file tells its format.
 const START: usize = 1 << 12;
@@ -116,11 +83,6 @@ pub fn read(mut bytes: Vec<u8>, name: &Path, request: &Request<'_>) -> Result<Pi
     let size = (image.width(), image.height());
     let colours = Some(Raster::from(image));
     Ok(Picture { name: name.into(), size, planes: Vec::new(), colours, resolution, profile, gamma, notes })
-}
-
-/// A note on samples of 16 bits.
-pub(crate) fn reduced(name: &Path) -> String {
-    format!("{}: 16 bits per channel are reduced to 8", name.display())
 }
 
 /// The format of a picture that is read.
@@ -188,20 +150,12 @@ pub fn flaw(bytes: &[u8], pixels: u64) -> Option<Flaw> {
     }
 }
 
-/// A picture that ends before its end.
-const CUT_SHORT: &str = "the picture ends before its last row: the file was cut short; copy or save it again";
-
 /// Why a picture cannot be decoded; `cause` is what reading its bytes ended with, if that is the reason.
 fn undecodable(name: &Path, error: &impl Display, cause: Option<&std::io::Error>) -> Diagnosis {
     match cause {
         Some(cause) if cause.kind() == ErrorKind::UnexpectedEof => Diagnosis::of_file(name, CUT_SHORT),
         _ => Diagnosis::of_file(name, format!("cannot decode the picture: {error}")),
     }
-}
-
-/// Refuses a JPEG that was cut short: the decoder makes up what it lacks.
-pub(crate) fn whole_jpeg(name: &Path, bytes: &[u8]) -> Result<(), Diagnosis> {
-    if jpeg::is_whole(bytes) { Ok(()) } else { Err(Diagnosis::of_file(name, CUT_SHORT)) }
 }
 
 #[cfg(test)]

@@ -12,45 +12,14 @@ use std::io::Cursor;
 use std::path::Path;
 
 use image::codecs::hdr::HdrDecoder;
-use image::error::ImageError;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder as _, ImageFormat};
 
 use crate::exr::{Floats, Primaries};
+use crate::fault::Fault;
 use crate::floats::FloatTiff;
 use crate::resolution::{Dpi, of_file};
 use crate::{Bounds, Opened, exr, floats, gamma, limits};
-
-/// Why a picture cannot be read.
-#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-pub enum Fault {
-    /// It has no known format; what it is instead.
-    #[error("found {0}")]
-    Unknown(&'static str),
-    /// It is larger than allowed.
-    #[error("{0}")]
-    Large(String),
-    /// It has pixels that are not decoded.
-    #[error("{0}")]
-    Unsupported(String),
-    /// It has pixels of another kind than is read; with what to do.
-    #[error("{0}")]
-    Kind(String),
-    /// It is damaged.
-    #[error("{0}")]
-    Damaged(String),
-}
-
-impl From<ImageError> for Fault {
-    fn from(error: ImageError) -> Fault {
-        let said = error.to_string();
-        match error {
-            ImageError::Limits(_) => Fault::Large(said),
-            ImageError::Unsupported(_) => Fault::Unsupported(said),
-            _ => Fault::Damaged(said),
-        }
-    }
-}
 
 /// The format of a file.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

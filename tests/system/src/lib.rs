@@ -57,7 +57,7 @@ pub fn run(seed: u64, script: Option<BTreeSet<Key>>) -> Run {
     let folder = folder.expect("a folder for the journal");
     let notes = users::furnish(folder.path());
     let memory = MEMORY.take().unwrap_or_else(|| board::memory(4096, 4096));
-    let world = Shared::new(World::new(seed, Chance::new(seed, script), notes, memory));
+    let world = Shared::new(World::new(seed, Chance::new(seed, script), notes, memory), users::run);
     let whole = |world: &Shared| world.look().broken.is_none();
     while whole(&world) && world.look().step < ROUGH {
         world.step(Duration::from_millis(20));

@@ -7,7 +7,7 @@
 use crate::chance::{Draw, Kind};
 use crate::pool;
 use crate::promises::Promise;
-use crate::world::{Shared, USERS};
+use crate::world::{Killed, Shared, USERS};
 use device::connection::transport::Transport;
 use device::connection::{Address, OpenError};
 use device::deliver::{self, Caller, Delivery, Failure, News, Question, store};
@@ -25,22 +25,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// A process was killed.
-struct Killed;
-
 /// How long a bridge may take to answer.
 const BRIDGE: Duration = Duration::from_secs(3);
 
 /// The numbers of the users, and of one who may not open the bridge.
 #[cfg(target_os = "linux")]
 const NUMBERS: [u32; USERS + 1] = [10_001, 10_002, 10_003];
-
-/// Ends this user's process if it was killed.
-pub fn live(world: &Shared, user: usize) {
-    if world.look().doomed[user] {
-        resume_unwind(Box::new(Killed));
-    }
-}
 
 /// Whether the test may choose who it is.
 pub fn can_be_others() -> bool {
@@ -120,7 +110,7 @@ struct Person<'w> {
 
 impl Caller for Person<'_> {
     fn tell(&self, news: &News<'_>) {
-        live(self.world, self.user);
+        self.world.live(self.user);
         if let News::Queued { entry, .. } = news {
             self.number.set(Some(entry.record.job));
             self.world.look().meet(entry.record.job, self.which.get(), self.user, false);

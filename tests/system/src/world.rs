@@ -25,7 +25,7 @@ use protocol::link::message::{Fault, JobState, Progress};
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 
-pub use shared::Shared;
+pub use shared::{Killed, Shared};
 
 /// Users who may open the bridge.
 pub const USERS: usize = 2;

@@ -21,6 +21,9 @@
 //! | `serial_number` | the number of this very board, 0 if it does not tell |
 //! | `flash_bytes` | the size of its flash |
 
+use embassy_rp::flash::{Blocking, Flash};
+use embassy_rp::peripherals;
+
 #[cfg(feature = "pico")]
 mod rp2040;
 #[cfg(feature = "pico2")]
@@ -33,6 +36,12 @@ pub use rp2350::*;
 
 #[cfg(all(feature = "pico", feature = "pico2"))]
 compile_error!("one board at a time: `--no-default-features --features pico2` builds for a Pico 2");
+
+/// The largest chip: 16 MiB, which is as much as the processor sees.
+const MOST: usize = 16 << 20;
+
+/// The flash of the board.
+pub type Whole = Flash<'static, peripherals::FLASH, Blocking, MOST>;
 
 /// Where the flash begins, as the processor sees it.
 pub const FLASH: usize = 0x1000_0000;

@@ -2,7 +2,7 @@
 //!
 //! RP2040-E1, the watchdog that counts twice a tick, is met by `embassy_rp`, which loads twice the time on this chip alone.
 
-use crate::flash::Whole;
+use super::Whole;
 use core::ops::Range;
 use embassy_rp::pac;
 use embassy_rp::pac::dma::Channel;

@@ -9,7 +9,7 @@
 //! * The watchdog counts once a tick: RP2040-E1 is not here. `embassy_rp` knows.
 
 use super::FLASH;
-use crate::flash::Whole;
+use super::Whole;
 use core::ops::Range;
 use embassy_rp::otp;
 use embassy_rp::pac;

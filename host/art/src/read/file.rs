@@ -3,10 +3,11 @@
 //! Method: a file is refused by its size before it is read. Cost: its bytes in memory. Limits: a gigabyte,
 //! [`MOST_PIXELS`] pixels.
 
-use std::fs::File;
-use std::io::{BufReader, Read as _};
+use std::io::BufReader;
 use std::path::Path;
 
+use files::FileError;
+use files::shelf::{Disk, Shelf};
 use observe::Diagnosis;
 use readers::{Picture, Request};
 
@@ -31,31 +32,25 @@ pub(crate) const PICTURE: Request<'static> = Request {
 };
 
 /// The first bytes of a file.
-pub(crate) fn start(path: &Path) -> Result<Vec<u8>, Diagnosis> {
-    let mut start = Vec::new();
-    let opened = File::open(path).map_err(io(path, "open it"))?;
-    opened.take(START).read_to_end(&mut start).map_err(io(path, "read it"))?;
-    Ok(start)
+pub(crate) fn start(shelf: &dyn Shelf, path: &Path) -> Result<Vec<u8>, Diagnosis> {
+    shelf.start(path, START).map_err(io(path, "open it"))
 }
 
 /// All bytes of a file that has at most so many, in words.
-pub(crate) fn whole(path: &Path, (most, words): (u64, &str)) -> Result<Vec<u8>, Diagnosis> {
-    let file = File::open(path).map_err(io(path, "open it"))?;
-    let stated = file.metadata().map_err(io(path, "read its size"))?.len();
-    let mut bytes = Vec::new();
-    if stated <= most {
-        // It may have grown since.
-        file.take(most + 1).read_to_end(&mut bytes).map_err(io(path, "read it"))?;
-    }
-    if stated > most || bytes.len() as u64 > most {
-        return Err(wrong(path, format!("the file is larger than {words}")));
-    }
-    Ok(bytes)
+pub(crate) fn whole(
+    shelf: &dyn Shelf,
+    path: &Path,
+    (most, words): (u64, &str),
+) -> Result<Vec<u8>, Diagnosis> {
+    shelf.read(path, most).map_err(|error| match error {
+        FileError::Io { source, .. } => io(path, "read it")(source),
+        _ => wrong(path, format!("the file is larger than {words}")),
+    })
 }
 
 /// The picture in a file; of a TIFF with several pages the one of this number.
-pub(crate) fn picture(path: &Path, page: Option<u32>) -> Result<Picture, Diagnosis> {
-    picture_of(path, whole(path, MOST)?, &Request { page, ..PICTURE })
+pub(crate) fn picture(shelf: &dyn Shelf, path: &Path, page: Option<u32>) -> Result<Picture, Diagnosis> {
+    picture_of(path, whole(shelf, path, MOST)?, &Request { page, ..PICTURE })
 }
 
 /// The picture in these bytes of a file.
@@ -69,7 +64,7 @@ pub(crate) fn picture_of(path: &Path, bytes: Vec<u8>, asked: &Request<'_>) -> Re
     readers::read(bytes, path, asked)
 }
 
-/// Pixels across and down of a picture, if it is one.
+/// Pixels across and down of a picture on disk, if it is one.
 pub(crate) fn size(path: &Path) -> Option<(u32, u32)> {
-    readers::size(BufReader::new(File::open(path).ok()?))
+    readers::size(BufReader::new(Disk.open(path).ok()?))
 }

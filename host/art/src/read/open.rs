@@ -7,6 +7,7 @@
 
 use std::path::{Path, PathBuf};
 
+use files::shelf::{Kind, Shelf};
 use observe::{Diagnosis, Observer};
 use protocol::ink::Ink;
 use rayon::prelude::*;
@@ -44,9 +45,9 @@ const MOST_FILES: usize = 64;
 /// Damaged files, unknown inks, layers of different sizes, art without a size. Each error names the file and what to do. Art without a
 /// dot is left to [`compose`](crate::compose()).
 pub fn open(paths: &[PathBuf], options: &Options, observer: &dyn Observer) -> Result<Artwork, Diagnosis> {
+    let shelf = &*options.shelf;
     for path in paths {
-        // A pipe would be waited for.
-        if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+        if shelf.kind(path).is_ok_and(|kind| kind == Kind::Other) {
             return Err(wrong(path, "it is a pipe or a device").hint("save the art as an ordinary file"));
         }
     }
@@ -54,9 +55,9 @@ pub fn open(paths: &[PathBuf], options: &Options, observer: &dyn Observer) -> Re
         [] => {
             return Err(nothing("no file was given"));
         }
-        [folder] if folder.is_dir() => {
+        [folder] if shelf.is_folder(folder) => {
             without_pages(folder, options)?;
-            let Listing { pictures, others } = listing(folder)?;
+            let Listing { pictures, others } = listing(shelf, folder)?;
             // Resolved, so that `.` has a name as well.
             let own = std::path::absolute(folder).unwrap_or_else(|_| folder.clone());
             let mut art = named_files(&stem(&own), &pictures, options, observer)?;
@@ -82,9 +83,9 @@ pub fn open(paths: &[PathBuf], options: &Options, observer: &dyn Observer) -> Re
 
 /// Whether a path is plainly art for [`open`], judged by its name: a drawing, a page, a picture, or a folder of pictures named after
 /// inks. Serves commands that expect something else and want to point here.
-pub fn is_art(path: &Path) -> bool {
-    if path.is_dir() {
-        return listing(path)
+pub fn is_art(shelf: &dyn Shelf, path: &Path) -> bool {
+    if shelf.is_folder(path) {
+        return listing(shelf, path)
             .is_ok_and(|listing| listing.pictures.iter().all(|file| names::ink(&stem(file)).is_some()));
     }
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
@@ -93,7 +94,8 @@ pub fn is_art(path: &Path) -> bool {
 }
 
 fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, Diagnosis> {
-    let start = file::start(file)?;
+    let shelf = &*options.shelf;
+    let start = file::start(shelf, file)?;
     if pdf::is_document(&start) {
         return pdf::read(file, options, observer);
     }
@@ -104,10 +106,10 @@ fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<
     if !is_tiff {
         without_pages(file, options)?;
     }
-    if svg::is_svg(file, &start) {
+    if svg::is_svg(shelf, file, &start) {
         return svg::read(file, options, observer);
     }
-    let bytes = file::whole(file, file::MOST)?;
+    let bytes = file::whole(shelf, file, file::MOST)?;
     if readers::is_layered(&start) {
         return layered::read(file, bytes, options, observer);
     }
@@ -135,17 +137,15 @@ struct Listing {
     others: Vec<PathBuf>,
 }
 
-fn listing(folder: &Path) -> Result<Listing, Diagnosis> {
-    let listed = io(folder, "list it");
+fn listing(shelf: &dyn Shelf, folder: &Path) -> Result<Listing, Diagnosis> {
     let (mut files, mut others) = (Vec::new(), Vec::new());
-    for entry in std::fs::read_dir(folder).map_err(&listed)? {
-        let path = entry.map_err(&listed)?.path();
-        let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-        let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
-        let extension = extension.unwrap_or_default();
-        if hidden || !path.is_file() {
+    for (name, kind) in shelf.list(folder).map_err(io(folder, "list it"))? {
+        if name.starts_with('.') || kind != Kind::File {
             continue;
         }
+        let path = folder.join(name);
+        let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+        let extension = extension.unwrap_or_default();
         if PICTURES.contains(&extension.as_str()) {
             files.push(path);
         } else if OTHERS.contains(&extension.as_str()) {
@@ -161,8 +161,6 @@ fn listing(folder: &Path) -> Result<Listing, Diagnosis> {
         let problem = format!("the folder has {} pictures; expected at most {MOST_FILES}", files.len());
         return Err(wrong(folder, problem));
     }
-    files.sort();
-    others.sort();
     Ok(Listing { pictures: files, others })
 }
 
@@ -195,9 +193,9 @@ fn named_files(
         let ink = stem(path);
         let named =
             names::ink(&ink).ok_or_else(|| unknown_ink(path, NamedPart::File, &ink, names::closest(&ink)))?;
-        let start = file::start(path)?;
+        let start = file::start(&*options.shelf, path)?;
         let kinds = [
-            (svg::is_svg(path, &start), "SVG"),
+            (svg::is_svg(&*options.shelf, path, &start), "SVG"),
             (pdf::is_document(&start), "PDF or PostScript"),
             (readers::is_layered(&start), "OpenRaster or Krita's own format"),
         ];
@@ -218,7 +216,7 @@ fn pages_of_inks(
     options: &Options,
     observer: &dyn Observer,
 ) -> Result<Artwork, Diagnosis> {
-    let pages = readers::pages(&file::whole(file, file::MOST)?);
+    let pages = readers::pages(&file::whole(&*options.shelf, file, file::MOST)?);
     if pages != inks.len() {
         let problem = format!("it has {pages} pages, but {} inks are named for them", inks.len());
         return Err(wrong(file, problem));
@@ -244,7 +242,9 @@ fn layers(
     observer.begin("reading layers", sources.len() as u64);
     let mut layers = Layers::new(name, stated, options);
     for pair in sources.chunks(2) {
-        let read = |source: &Source| Ok(Scan::of_picture(file::picture(&source.path, source.page)?));
+        let read = |source: &Source| {
+            Ok(Scan::of_picture(file::picture(&*options.shelf, &source.path, source.page)?))
+        };
         let scans: Vec<Result<Scan, Diagnosis>> = pair.par_iter().map(read).collect();
         for (scan, source) in scans.into_iter().zip(pair) {
             let scan = scan?;

@@ -29,6 +29,7 @@ use crate::read::picture;
 use crate::read::size::{self, Unstated};
 use draw::{DRAFT, Drafts, Leaf, Part, Tagged};
 use files::scratch::Scratch;
+use files::shelf::Disk;
 use observe::{Diagnosis, Observer};
 use readers::Raster;
 
@@ -56,6 +57,12 @@ fn is_pdf(start: &[u8]) -> bool {
 
 /// Reads a document.
 pub(crate) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, Diagnosis> {
+    if !options.shelf.is_disk() || cfg!(target_family = "wasm") {
+        let problem = "it is drawn by Ghostscript, which reads files on disk, on a computer that has it";
+        return Err(
+            wrong(path, problem).hint("print it with the program foilpress, or export it as SVG or PNG")
+        );
+    }
     let folder = Scratch::new().map_err(io(path, "make a folder for its pages"))?;
     let only = options.page();
     observer.begin("reading pages", 2);
@@ -201,7 +208,7 @@ impl Document<'_> {
     /// A page as coverage.
     fn layer(&self, leaf: &Leaf, dpi: (f64, f64)) -> Result<Scan, Diagnosis> {
         let drawn = draw::picture((self.path, self.interpreter), leaf.number, dpi, self.folder)?;
-        let mut picture = file::picture(&drawn, None)?;
+        let mut picture = file::picture(&Disk, &drawn, None)?;
         picture.to_srgb()?;
         let rgba = picture.colours.map_or_else(Vec::new, Raster::into_rgba);
         Ok(Scan::of_page(self.path, picture.size, &rgba))

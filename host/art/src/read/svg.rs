@@ -61,9 +61,15 @@ const MOST_BYTES: u64 = 1 << 28;
 
 /// Reads a drawing.
 pub(crate) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, Diagnosis> {
-    let bytes = file::whole(path, (MOST_BYTES, "256 MB, which is more than a drawing has"))?;
+    let bytes = file::whole(&*options.shelf, path, (MOST_BYTES, "256 MB, which is more than a drawing has"))?;
     let (steps, done) = mpsc::channel();
     let drawing = Drawing { path: path.to_path_buf(), options: options.clone() };
+    if cfg!(target_family = "wasm") {
+        // It has no threads, and whoever started the work there can end it.
+        let art = drawing.draw(bytes, &|step| step.tell(observer));
+        observer.end();
+        return art;
+    }
     let begun = thread::Builder::new().name(DRAWING.into()).stack_size(bounds::STACK).spawn(move || {
         // Nobody listens any more if it took too long.
         let drawn = drawing.draw(bytes, &|step| drop(steps.send(step)));
@@ -73,9 +79,8 @@ pub(crate) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     let limit = process::limit();
     let art = loop {
         match done.recv_timeout(limit) {
-            Ok(Step::Layers(count)) => observer.begin("rendering layers", count),
-            Ok(Step::Layer) => observer.advance(1),
             Ok(Step::Done(art)) => break *art,
+            Ok(step) => step.tell(observer),
             Err(RecvTimeoutError::Timeout) => break Err(wrong(path, process::too_long(limit))),
             Err(RecvTimeoutError::Disconnected) => {
                 break Err(wrong(path, "the drawing cannot be rendered")
@@ -94,6 +99,16 @@ enum Step {
     /// One of them is rendered.
     Layer,
     Done(Box<Result<Artwork, Diagnosis>>),
+}
+
+impl Step {
+    fn tell(&self, observer: &dyn Observer) {
+        match self {
+            Step::Layers(count) => observer.begin("rendering layers", *count),
+            Step::Layer => observer.advance(1),
+            Step::Done(_) => {}
+        }
+    }
 }
 
 /// The text of a drawing with the styles that count, if they are not as written, and a note on those that do not.
@@ -163,7 +178,7 @@ impl Drawing {
             ));
         }
         let measure = units::measure(root);
-        let renderer = Renderer::new(path, text || links_drawing(root), measure.per_inch)?;
+        let renderer = Renderer::new(&options.shelf, path, text || links_drawing(root), measure.per_inch)?;
         let widths = strokes::widths(root, |text| renderer.tree(text))?;
         // Some programs ask for soft edges, which are neither ink nor paper.
         let own = root.attribute("style").unwrap_or_default();

@@ -1,5 +1,7 @@
 //! Art as programs save it: what their files say in ways of their own.
 
+use ::files::shelf::Disk;
+
 use super::drawings::drawing;
 use super::*;
 
@@ -422,7 +424,7 @@ fn the_gamma_of_a_png_is_applied_and_a_profile_that_expands_is_an_error() {
         })
     };
     let pixels = |path: PathBuf| {
-        let mut picture = file::picture(&path, None).unwrap();
+        let mut picture = file::picture(&Disk, &path, None).unwrap();
         picture.to_srgb().unwrap();
         (picture.colours.unwrap().samples, picture.notes)
     };

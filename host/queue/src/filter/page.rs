@@ -55,7 +55,7 @@ impl Press<'_> {
 
     /// How a page is read, drawn at so many pixels an inch.
     pub(super) fn options(&self, dpi: u16) -> art::Options {
-        let read = self.choices.settings(self.choices.paper, self.library).read;
+        let read = layers::Settings::of(self.choices, self.choices.paper, self.library).read;
         art::Options { dpi: Some(dpi.into()), ..read }
     }
 
@@ -97,7 +97,7 @@ impl Press<'_> {
 
     /// How a page is printed, in the middle of its paper.
     fn settings(&self, paper: Paper, mirror: bool) -> layers::Settings {
-        let mut settings = self.choices.settings(paper, self.library);
+        let mut settings = layers::Settings::of(self.choices, paper, self.library);
         settings.page.layout.mirror = mirror;
         settings
     }

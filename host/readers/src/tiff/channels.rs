@@ -20,7 +20,7 @@ use observe::Diagnosis;
 
 use super::pages;
 use crate::picture::{Picture, Plane, PlaneKind, Process, Raster};
-use crate::read::Request;
+use crate::request::Request;
 use crate::resolution::{TiffDecoder, of_file, tiff_decoder};
 use crate::turn::Turn;
 

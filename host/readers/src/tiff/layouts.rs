@@ -21,7 +21,7 @@ use rayon::prelude::*;
 
 use super::channels::{self, PROFILE};
 use crate::picture::{Picture, Raster};
-use crate::read::{Request, reduced};
+use crate::request::{Request, reduced};
 use crate::resolution::{TiffDecoder, of_file, tiff_decoder};
 use crate::turn::Turn;
 

@@ -126,7 +126,7 @@ impl DocumentArgs {
         };
         let mut document = match document::open(&self.document, &options, observer) {
             Ok(document) => document,
-            Err(error) if art::is_art(Path::new(&self.document)) => {
+            Err(error) if art::is_art(&Disk, Path::new(&self.document)) => {
                 return Err(anyhow::Error::new(error).context(format!(
                     "{0} is artwork, not a document of materials: `foilpress layers {0}` prints it, `foilpress plan layers {0}` plans it",
                     self.document

@@ -1,44 +1,63 @@
 //! The world for those who live in it: time passes where they wait, and their links are pipes to the board.
 
 use super::{Burst, Todo, WAYS, World};
+use crate::chance::Draw;
 use device::connection::transport::Transport;
 use device::connection::{Address, OpenError};
 use std::io;
+use std::panic::resume_unwind;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// The world, for those who live in it.
 #[derive(Clone)]
-pub struct Shared(Arc<Mutex<World>>);
+pub struct Shared {
+    world: Arc<Mutex<World>>,
+    /// Begins what one of them does next.
+    start: Start,
+}
+
+/// What a user does next, by chance.
+pub type Start = fn(&Shared, usize, Draw);
+
+/// A process was killed.
+pub struct Killed;
 
 impl Shared {
-    /// The world.
-    pub fn new(world: World) -> Shared {
-        Shared(Arc::new(Mutex::new(world)))
+    /// The world, and how those who live in it begin what they do.
+    pub fn new(world: World, start: Start) -> Shared {
+        Shared { world: Arc::new(Mutex::new(world)), start }
     }
 
     /// A look at it.
     pub fn look(&self) -> MutexGuard<'_, World> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.world.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The world alone again, when nobody lives in it any more.
     pub fn into_world(self) -> Option<World> {
-        Arc::into_inner(self.0).map(|world| world.into_inner().unwrap_or_else(PoisonError::into_inner))
+        Arc::into_inner(self.world).map(|world| world.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// A step of at most this long.
     pub fn step(&self, most: Duration) {
         let todo = self.look().turn(most.as_micros() as u64);
         if let Todo::Start(user, draw) = todo {
-            crate::users::run(self, user, draw);
+            (self.start)(self, user, draw);
+        }
+    }
+
+    /// Ends this user's process if it was killed.
+    pub fn live(&self, user: usize) {
+        if self.look().doomed[user] {
+            resume_unwind(Box::new(Killed));
         }
     }
 
     /// Opens the way of this user.
     pub fn open(&self, user: usize, address: &Address) -> Result<Box<dyn Transport>, OpenError> {
         self.step(Duration::from_millis(2));
-        crate::users::live(self, user);
+        self.live(user);
         let mut world = self.look();
         if world.board.is_none() || world.pulled_until > world.now {
             return Err(OpenError::Absent(address.clone()));
@@ -59,7 +78,7 @@ impl Shared {
                 return;
             }
             self.step(Duration::from_micros(end - now));
-            crate::users::live(self, user);
+            self.live(user);
         }
     }
 }
@@ -96,7 +115,7 @@ impl Transport for SimulatedLink {
         loop {
             let left = end.saturating_sub(self.world.look().now);
             self.world.step(Duration::from_micros(left));
-            crate::users::live(&self.world, self.user);
+            self.world.live(self.user);
             let mut world = self.world.look();
             if !self.is_open(&world) {
                 return Err(io::ErrorKind::UnexpectedEof.into());

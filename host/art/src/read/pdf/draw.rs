@@ -20,6 +20,7 @@ use crate::read::names::stem;
 use crate::read::object_type;
 use crate::read::process::{self, MOST_PAGES, Process, ProcessError};
 use files::scratch::Scratch;
+use files::shelf::Disk;
 use observe::Diagnosis;
 
 /// Resolution of drafts.
@@ -213,7 +214,7 @@ fn leaves(
         let (mut drawn, mut spots) = (false, Vec::new());
         for (name, plate) in plates.remove(&stem(&draft)).unwrap_or_default() {
             // A page paints every pixel it touches, so a draft misses nothing.
-            if Scan::of_picture(file::picture(&plate, None)?).coverage.iter().any(|&c| c > 0) {
+            if Scan::of_picture(file::picture(&Disk, &plate, None)?).coverage.iter().any(|&c| c > 0) {
                 drawn = true;
                 if !PROCESS.contains(&name.as_str()) {
                     spots.push(name);

@@ -36,6 +36,7 @@ use crate::read::picture;
 use crate::read::size;
 use crate::window::Window;
 use files::scratch::Scratch;
+use files::shelf::Disk;
 use observe::{Diagnosis, Observer};
 
 /// Full ink in what Ghostscript says of a spot. Source: `frac_1` in Ghostscript's `gxfrac.h`, 0x7ff8.
@@ -159,7 +160,7 @@ pub(super) fn separated_part(
     let (mut plates, mut notes) = (Vec::new(), Vec::new());
     let (mut process, mut others, mut cuts) = (Vec::new(), Vec::new(), Vec::new());
     for (plate, plate_file) in plates_beside(&full, &folder)? {
-        let scan = Scan::of_picture(file::picture(&plate_file, None)?);
+        let scan = Scan::of_picture(file::picture(&Disk, &plate_file, None)?);
         if (scan.width, scan.height) != (width, height) {
             return Err(wrong(path, format!("plate {plate} of page {page} differs in size from the page")));
         }
@@ -257,7 +258,7 @@ fn kept(
     again: &[(String, PathBuf)],
 ) -> Result<Option<Vec<u8>>, Diagnosis> {
     let Some((_, again)) = again.iter().find(|(name, _)| name == plate) else { return Ok(None) };
-    let mut whole = Scan::of_picture(file::picture(again, None)?).coverage;
+    let mut whole = Scan::of_picture(file::picture(&Disk, again, None)?).coverage;
     if whole.len() != white.len() {
         return Ok(None);
     }

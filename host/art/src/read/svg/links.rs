@@ -11,9 +11,11 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::Read as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use files::FileError;
+use files::shelf::Shelf;
 use percent_encoding::percent_decode_str;
 use readers::Flaw;
 use resvg::usvg::{ImageHrefResolver, ImageKind};
@@ -47,6 +49,7 @@ pub(super) type Known = Arc<Mutex<HashMap<u64, Option<&'static str>>>>;
 
 /// Loads pictures, and takes down what it met.
 pub(super) fn resolver(
+    shelf: &Arc<dyn Shelf>,
     path: &Path,
     without: Without,
     met: &Arc<Mutex<Met>>,
@@ -74,7 +77,7 @@ pub(super) fn resolver(
     let (data, in_file) =
         (ImageHrefResolver::default_data_resolver(), ImageHrefResolver::default_data_resolver());
     let (of_data, of_link, taken_link) = (met.clone(), met.clone(), taken.clone());
-    let of = path.to_owned();
+    let (of, shelf) = (path.to_owned(), Arc::clone(shelf));
     let folder = path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new(".")).to_owned();
     ImageHrefResolver {
         resolve_data: Box::new(move |mime, bytes, options| {
@@ -85,7 +88,7 @@ pub(super) fn resolver(
             taken(&of_data, found, &format!("of the type `{mime}`"), "embed it as PNG")
         }),
         resolve_string: Box::new(move |href, options| {
-            let found = file(&folder, href).and_then(|bytes| {
+            let found = file(&*shelf, &folder, href).and_then(|bytes| {
                 let drawing = drawable(Path::new(href), &bytes, &of_link)?.unwrap_or_else(|| Arc::new(bytes));
                 // The kind is told by the bytes.
                 in_file("text/plain", drawing, options).ok_or(UNREADABLE)
@@ -99,27 +102,23 @@ pub(super) fn resolver(
 const UNREADABLE: &str = "cannot be read";
 
 /// The bytes of a linked file, or why there are none.
-fn file(folder: &Path, href: &str) -> Result<Vec<u8>, &'static str> {
+fn file(shelf: &dyn Shelf, folder: &Path, href: &str) -> Result<Vec<u8>, &'static str> {
     // Links are addresses, so a space is written `%20`.
     let local = href.strip_prefix("file://").unwrap_or(href);
     let plain = percent_decode_str(local).decode_utf8().unwrap_or(Cow::Borrowed(local));
-    let folder = folder.canonicalize().map_err(|_| UNREADABLE)?;
-    let found = |name: &str| folder.join(name).canonicalize();
-    let path: PathBuf = found(local).or_else(|_| found(&plain)).map_err(|_| UNREADABLE)?;
+    let found = |name: &str| shelf.resolved(&folder.join(name));
+    let folder = shelf.resolved(folder).map_err(|_| UNREADABLE)?;
+    let path = found(local).or_else(|_| found(&plain)).map_err(|_| UNREADABLE)?;
     if !path.starts_with(&folder) {
         return Err("lies outside of the folder of the drawing, so it is not read");
     }
-    let about = path.metadata().map_err(|_| UNREADABLE)?;
-    if !about.is_file() {
+    if !shelf.is_file(&path) {
         return Err("is no ordinary file");
     }
-    if about.len() > MOST_BYTES {
-        return Err("is too large");
-    }
-    let mut bytes = Vec::new();
-    let opened = std::fs::File::open(path).map_err(|_| UNREADABLE)?;
-    opened.take(MOST_BYTES).read_to_end(&mut bytes).map_err(|_| UNREADABLE)?;
-    Ok(bytes)
+    shelf.read(&path, MOST_BYTES).map_err(|error| match error {
+        FileError::Large { .. } => "is too large",
+        _ => UNREADABLE,
+    })
 }
 
 /// The type of a drawing.

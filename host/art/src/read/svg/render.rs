@@ -10,6 +10,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use files::shelf::Shelf;
 use observe::Diagnosis;
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg;
@@ -21,6 +22,7 @@ use crate::error::wrong;
 
 /// Renders drawings from one file.
 pub(super) struct Renderer {
+    shelf: Arc<dyn Shelf>,
     path: PathBuf,
     /// Pixels in an inch.
     per_inch: f64,
@@ -39,9 +41,15 @@ pub(super) struct Drawn {
 
 impl Renderer {
     /// `text` says whether the drawing needs fonts, `per_inch` how many pixels an inch has.
-    pub fn new(path: &Path, text: bool, per_inch: f64) -> Result<Renderer, Diagnosis> {
+    pub fn new(
+        shelf: &Arc<dyn Shelf>,
+        path: &Path,
+        text: bool,
+        per_inch: f64,
+    ) -> Result<Renderer, Diagnosis> {
         let fonts = if text { Fonts::load(path)? } else { Fonts::none() };
-        Ok(Renderer { path: path.to_path_buf(), per_inch, fonts, known: Known::default() })
+        let (shelf, path) = (Arc::clone(shelf), path.to_path_buf());
+        Ok(Renderer { shelf, path, per_inch, fonts, known: Known::default() })
     }
 
     /// Whether text can be drawn.
@@ -110,7 +118,7 @@ impl Renderer {
             fontdb: fonts,
             font_family: DEFAULT.into(),
             font_resolver: self.fonts.resolver(),
-            image_href_resolver: links::resolver(&self.path, without, met, &self.known),
+            image_href_resolver: links::resolver(&self.shelf, &self.path, without, met, &self.known),
             ..usvg::Options::default()
         }
     }

@@ -7,28 +7,27 @@
 //! lies within the first megabyte; EBCDIC and UTF-32 are errors.
 
 use std::borrow::Cow;
-use std::io::Read;
 use std::path::Path;
 
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
 use crate::error::wrong;
+use files::shelf::Shelf;
 use observe::Diagnosis;
 
 /// How far into a file its first element is looked for: enough for any declaration and comment before it.
 const PROLOG: u64 = 1 << 20;
 
 /// Whether a file is an SVG drawing; `start` holds its first bytes.
-pub(crate) fn is_svg(file: &Path, start: &[u8]) -> bool {
+pub(crate) fn is_svg(shelf: &dyn Shelf, file: &Path, start: &[u8]) -> bool {
     let begins = |bytes: &[u8]| first_element(&lossy(bytes));
     match begins(start) {
         First::Named(name) => name == "svg" || lossy(start).contains("<svg"),
         First::NoMarkup => false,
         // The prolog is longer than what was read.
         First::Further => {
-            let mut more = Vec::new();
-            let read = std::fs::File::open(file).and_then(|file| file.take(PROLOG).read_to_end(&mut more));
-            read.is_ok() && matches!(begins(&more), First::Named(name) if name == "svg")
+            let more = shelf.start(file, PROLOG);
+            more.is_ok_and(|more| matches!(begins(&more), First::Named(name) if name == "svg"))
         }
     }
 }
