@@ -16,6 +16,7 @@ fn runs(what: &str) -> bool {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn endless_pages_end_at_the_limit_in_every_path_and_nothing_runs_on() {
     if !ghostscript() {
         return;

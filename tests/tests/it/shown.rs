@@ -1,7 +1,7 @@
 //! Commands that the README, the guides and the help show, run on small documents, or as they stand where
 //! [everything is tried](testing::is_full).
 //!
-//! Small is a third of every length on paper and of every picture's side, and 300 pixels for a preview; each word of a
+//! Small is a sixth of every length on paper and of every picture's side, and 150 pixels for a preview; each word of a
 //! command is there, in its order. What prints a document or art is asked for its plan instead ([`planned`]):
 //! the same words decide the same dots, and pictures and pages of a print are what other tests look at. What
 //! a later command would have of such a print is then not there, and the command has to say so; that its
@@ -123,7 +123,7 @@ fn copy(from: &Path, to: &Path) {
 }
 
 /// What every length is divided by.
-const SMALLER: f64 = 3.0;
+const SMALLER: f64 = 6.0;
 
 /// The command with the numbers behind this option smaller.
 fn scaled(command: &str, option: &str) -> String {
@@ -233,7 +233,7 @@ impl Desk {
                 }
             }
             if command.starts_with("foilpress preview ") && !command.contains("--pixels") {
-                command.push_str(" --pixels 300");
+                command.push_str(" --pixels 150");
             }
         }
         if let Some(rest) = command.strip_prefix("cargo run --release -- ") {

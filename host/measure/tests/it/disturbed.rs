@@ -154,6 +154,7 @@ impl Outcome {
 
 /// Without a disturbance nothing is doubted, and the figures are those that are promised.
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_tidy_studio_gives_no_doubts() {
     for material in testing::drawn(&MATERIALS, 2) {
         for case in &TIDY {
@@ -210,6 +211,7 @@ const GATE: [(&str, &str); 14] = [
 const SILENT: [(&str, &str); 0] = [];
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn nothing_is_wrong_in_silence() {
     let only = std::env::var("FOILPRESS_CASE").ok();
     let chosen = |material: &Material, case: &Disturbance| match &only {

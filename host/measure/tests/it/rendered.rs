@@ -124,6 +124,7 @@ fn materials_with_known_geometry() {
 }
 
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_wrong_tape_is_corrected() {
     let Some(script) = renderer() else { return };
     let solved = Tape { known: false, ..EXACT };
@@ -161,6 +162,7 @@ fn halved_field() -> f64 {
 
 /// A part of a pixel that is left after the alignment is found with the geometry: without that a foil's lamp comes out 24 mm aside.
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_hand_held_camera_is_aligned() {
     let Some(script) = renderer() else { return };
     let exact = Tape { field_of_view: halved_field(), ..EXACT };
@@ -240,6 +242,7 @@ fn a_clipped_peak_is_never_silent() {
 
 /// A flat sheet under seven lamps, rendered one by one.
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_flat_sheet_under_several_lamps() {
     let Some(script) = renderer() else { return };
     let material = &MATERIALS[3];

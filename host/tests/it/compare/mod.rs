@@ -211,6 +211,7 @@ fn neither_focus_nor_register_is_taken_for_inks() {
 
 /// Paper that is darker and yellower than the library's would make all of the print look brighter and bluer; a grey card does not.
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn a_grey_card_is_white_where_the_paper_is_not() {
     let bench = bench(&[]);
     let sheet = Sheet::with_card(&bench.path("tile.sheet"));
@@ -326,6 +327,7 @@ fn photographs_and_camera_files_that_do_not_serve_are_named() {
 
 /// Eight bits went through a camera's tone curve, and nobody knows which.
 #[test]
+#[ignore = "real time: cargo xtask test --full"]
 fn photographs_of_eight_bits_are_said_to_be_rough() {
     let bench = bench(&["left-1.png", "left-2.png"]);
     let warned = |camera: &str| -> Vec<String> {
