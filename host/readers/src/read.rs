@@ -128,8 +128,8 @@ pub enum Flaw {
     Damaged,
 }
 
-/// What is wrong with a picture of at most so many pixels, if anything is: also that it is none. Pixels of a kind
-/// that is not decoded are no flaw.
+/// What is wrong with a picture of at most so many pixels, if anything is; also that it is none. Pixels of a
+/// kind that is not decoded are no flaw.
 pub fn flaw(bytes: &[u8], pixels: u64) -> Option<Flaw> {
     let Ok(format) = image::guess_format(bytes) else { return Some(Flaw::Damaged) };
     if format == ImageFormat::Jpeg && !jpeg::is_whole(bytes) {

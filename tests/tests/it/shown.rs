@@ -1,8 +1,8 @@
 //! Commands that the README, the guides and the help show, run on small documents, or as they stand where
 //! [everything is tried](testing::is_full).
 //!
-//! Small is a sixth of every length on paper and of every picture's side, and 150 pixels for a preview; each word of a
-//! command is there, in its order. What prints a document or art is asked for its plan instead ([`planned`]):
+//! Small is a sixth of every length on paper and of every picture's side, and 150 pixels for a preview; each
+//! word of a command is there, in its order. What prints a document or art is asked for its plan instead ([`planned`]):
 //! the same words decide the same dots, and pictures and pages of a print are what other tests look at. What
 //! a later command would have of such a print is then not there, and the command has to say so; that its
 //! words are wrong it would say first. A document's commands run in order, in a copy of the folders that it
