@@ -1,21 +1,26 @@
-//! Digests of what every machine has to find: functions of `maths`, and the dots of a sample.
+//! Digests of what every machine has to find: functions of `maths`, and the dots of documents of each kind.
 //!
 //! Problem: that a result is equal on any machine is seen only where two machines find it.
 //! Method: the same functions are compiled for this machine and for WebAssembly, which Node runs: another
-//! processor, another library of mathematics, another allocator, no threads. All find the same digests.
-//! Cost: the stages are compiled once more. Limits: no documents of files; two samples.
+//! processor, another library of mathematics, another allocator, no threads. Files are read from memory. All
+//! find the same digests. Cost: the stages are compiled once more. Limits: no pages, which Ghostscript draws,
+//! and no text, which is drawn in the fonts of the machine.
 
-use std::borrow::Cow;
 use std::cell::RefCell;
 use std::error::Error;
+use std::path::PathBuf;
+use std::sync::Arc;
 
-use appearance::document::{Options, open};
-use appearance::factor::{FactorSettings, factor};
-use appearance::gamut::{GamutSettings, Mapped, Printable, map};
-use appearance::materials::Reduced;
-use inks::{InkSet, Library};
+use appearance::brdf::Space;
+use appearance::document::{Document, Options, open};
+use appearance::gamut::Printable;
+use appearance::views::{self, Pictures};
+use files::shelf::Memory;
+use make::{Layers, Print, layers, print};
 use maths::Maths;
 use observe::Silent;
+use readers::Pixels;
+use sheet::DotMap;
 
 /// FNV-1a.
 fn digest(bytes: impl IntoIterator<Item = u8>) -> u64 {
@@ -54,29 +59,84 @@ fn functions() -> u64 {
     digest(results.flat_map(|x| x.to_bits().to_le_bytes()))
 }
 
-/// Of the dots of a sample, some 20 mm wide, in the default inks.
-fn sample(name: &str) -> Result<u64, Box<dyn Error>> {
-    let document = open(&format!("sample:{name}"), &Options::default(), &Silent)?;
-    let reduced = Reduced::new(document.materials(), (80, 60));
-    let library = Library::builtin();
-    let printable = Printable::combined(&library, &InkSet::default(), document.materials().space());
-    let bases = || Ok(Cow::Owned(factor(&reduced, &FactorSettings::default(), &Silent)?.factored));
-    let mapped: Result<Mapped, Box<dyn Error>> =
-        map(&reduced, bases, &printable, &GamutSettings::default(), &Silent);
-    let mix = mapped?.mix;
-    let chosen = halftone::Settings::from_library(&mix.stacks, &library);
-    let dots = halftone::halftone(&mix, (480, 360), None, &chosen, &Silent)?;
-    Ok(digest(dots.index().iter().copied()))
+/// A dot's stack for each dot, and what these stacks are.
+fn of_dots(dots: &DotMap) -> u64 {
+    digest(format!("{:?}", dots.stacks()).bytes().chain(dots.index().iter().copied()))
+}
+
+/// Files in memory.
+fn shelf(files: &[(&str, &[u8])]) -> Result<Memory, Box<dyn Error>> {
+    let mut memory = Memory::default();
+    for (name, bytes) in files {
+        memory.insert(name, *bytes)?;
+    }
+    Ok(memory)
+}
+
+/// Of a document of materials, 20 mm wide, in the default inks.
+fn document(document: Document) -> Result<u64, Box<dyn Error>> {
+    let mut settings = print::Settings::default();
+    settings.dots.size = Some("20mm".parse()?);
+    Ok(of_dots(&Print::new(document, &settings, &Silent)?.halftoned.dots))
+}
+
+/// Of flat art, 12 mm wide.
+fn art(files: &[(&str, &[u8])]) -> Result<u64, Box<dyn Error>> {
+    let mut settings = layers::Settings::default();
+    settings.read.size = Some("12mm".parse()?);
+    settings.read.shelf = Arc::new(shelf(files)?);
+    let paths: Vec<PathBuf> = files.iter().map(|(name, _)| name.into()).collect();
+    let read = Layers::open(&paths, &settings, &Silent)?;
+    Ok(of_dots(&Layers::compose(&read, &settings, &Silent)?.composed.dots))
+}
+
+/// A picture with every tone, and noise.
+fn picture(size: (u32, u32), channels: [u32; 3]) -> Result<Vec<u8>, Box<dyn Error>> {
+    let tone = |x: u32, y: u32, step: u32| (x * 5 + y * step + (x * y * 7919) % 23) as u8;
+    let pixels = Pixels::from_fn(size.0, size.1, |x, y| channels.map(|step| tone(x, y, step)));
+    Ok(pixels.png()?)
+}
+
+const DRAWING: &[u8] = br##"<svg xmlns="http://www.w3.org/2000/svg" width="30mm" height="20mm"
+viewBox="0 0 30 20">
+<linearGradient id="g"><stop stop-color="#b32"/><stop offset="1" stop-color="#2ac"/></linearGradient>
+<circle cx="10.3" cy="10" r="8.1" fill="url(#g)"/>
+<path d="M18 3q9 1 9 14l-9 .3z" transform="rotate(7)" stroke="#361" fill="#ed7" stroke-width=".4"/></svg>"##;
+
+const BRASS: &[u8] =
+    br#"{"asset": {"version": "2.0"}, "materials": [{"name": "brass", "pbrMetallicRoughness":
+{"baseColorFactor": [0.8, 0.6, 0.2, 1], "metallicFactor": 1, "roughnessFactor": 0.4}}]}"#;
+
+/// The digest of one document of each kind.
+fn documents() -> Result<Vec<(&'static str, u64)>, Box<dyn Error>> {
+    let sample = |name: &str| open(&format!("sample:{name}"), &Options::default(), &Silent);
+    let brass = Options { shelf: Arc::new(shelf(&[("brass.gltf", BRASS)])?), ..Options::default() };
+    let (day, night) = (picture((40, 30), [3, 3, 3])?, picture((40, 30), [1, 9, 4])?);
+    let views = shelf(&[("day.png", &day), ("night.png", &night)])?;
+    let pair = Pictures::Pair { straight: "day.png".into(), highlight: "night.png".into() };
+    let (space, settings) = (Space::half_angle(Options::default().samples), print::Settings::default());
+    let printable = Printable::combined(&settings.library, &settings.dots.inks, &space);
+    let two = views::open(&views, &pair, None, &printable, &space, &Silent)?;
+    let photograph = picture((50, 40), [2, 7, 11])?;
+    let plate = |step: u32| picture((60, 50), [step; 3]);
+    Ok(vec![
+        ("leaf", document(sample("leaf")?)?),
+        ("dove", document(sample("dove")?)?),
+        ("glTF", document(open("brass.gltf", &brass, &Silent)?)?),
+        ("two pictures", document(two)?),
+        ("drawing", art(&[("drawing.svg", DRAWING)])?),
+        ("photograph", art(&[("photograph.png", &photograph)])?),
+        ("plates", art(&[("white.png", &plate(1)?), ("gold.png", &plate(6)?)])?),
+    ])
 }
 
 /// All digests, a line for each.
 ///
 /// # Panics
-/// Where a sample cannot be made.
+/// Where a document cannot be printed.
 pub fn digests() -> String {
     let mut lines = format!("functions {:016x}\n", functions());
-    for name in ["leaf", "dove"] {
-        let found = sample(name).expect("a sample can be printed");
+    for (name, found) in documents().expect("all can be printed") {
         lines.push_str(&format!("{name} {found:016x}\n"));
     }
     lines
