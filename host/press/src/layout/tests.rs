@@ -289,3 +289,16 @@ fn camera_marks_stand_clear_at_the_corners_of_the_print() {
     let black = Layout { mark_inks: vec![Ink::White, Ink::Black], ..layout };
     assert!(arrange(&pale, &black, &Silent).is_ok());
 }
+
+/// The curve in a tile is its own mirror image: a mirrored copy has whole tiles from its right side.
+#[test]
+fn the_walk_of_a_mirrored_copy_begins_with_the_first_whole_tile_from_the_right() {
+    for width in [100, 128, 333] {
+        let plain = Layout::centred(Paper::A4);
+        let left = frame(width, 50, &plain).unwrap();
+        let found = frame(width, 50, &Layout { mirror: true, ..plain }).unwrap();
+        let right = usize::from(left.x) + width;
+        assert_eq!((right - usize::from(found.x)) % usize::from(EDGE), 0, "{width}");
+        assert!(found.x >= left.x && found.x - left.x < EDGE, "{width}");
+    }
+}
