@@ -7,7 +7,8 @@
 //! name that stands inside a document goes through [`inside`], which refuses whatever could lead out of the
 //! document's folder. Cost: one virtual call for each file that is opened or read.
 //! Limits: a folder shows at most [`MOST_NAMES`] names. Links on disk are followed, as they are the user's
-//! own; [`Memory`] has none. [`Memory`] refuses `..`, as it has no folder above.
+//! own; [`Memory`] has none. [`Memory`] refuses `..`, as it has no folder above; only [`Shelf::resolved`]
+//! follows it, as far as it stays within.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Debug;

@@ -193,3 +193,34 @@ impl<'a> Layers<'a> {
         self.composed.suggestions.iter().map(of).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+
+    use art::Options;
+    use files::shelf::Memory;
+    use observe::Silent;
+    use readers::Pixels;
+
+    #[test]
+    fn art_in_memory_becomes_a_job_with_a_pass_of_its_ink_and_what_is_missing_is_named() {
+        let mut memory = Memory::default();
+        let square = Pixels::from_fn(60, 40, |x, _| [if x < 30 { 0u8 } else { 255 }; 3]);
+        memory.insert("gold.png", square.png().unwrap()).unwrap();
+        let mut settings = Settings::default();
+        settings.read =
+            Options { size: Some("6mm".parse().unwrap()), shelf: Arc::new(memory), ..settings.read };
+        let made = Layers::of(&["gold.png".into()], &settings, &Silent).unwrap();
+        let [pass] = &made.plan().passes[..] else { panic!("{:?}", made.plan().passes) };
+        // Half of 6 x 4 mm at 600 dpi, to a row of dots.
+        let inch = 600.0 / 25.4;
+        let half = 0.5 * (6.0 * inch) * (4.0 * inch);
+        assert_eq!(pass.ink, Ink::MetallicGold.name());
+        assert!((pass.dots as f64 / half - 1.0).abs() < 0.015, "{} dots, not {half}", pass.dots);
+        assert!(made.picture("preview.png", &Silent).unwrap().starts_with(b"\x89PNG"));
+        let missing = Layers::of(&["white.png".into()], &settings, &Silent).err().expect("it is missing");
+        assert!(missing.to_string().contains("white.png"), "{missing}");
+    }
+}

@@ -10,7 +10,8 @@
 //! has a thread of its own, because filters may take for ever, and the renderer may fail on hostile drawings.
 //! Cost: four bytes a dot while a layer is rendered, eight where it holds pictures. Limits: animations do not run; a layer
 //! may take as long as a page ([`process::limit`]). A thread cannot be stopped: one that takes too long ends with the
-//! program.
+//! program. A browser's machine has no threads: there a drawing is rendered in place, without a limit of
+//! time.
 
 mod bounds;
 mod find;
