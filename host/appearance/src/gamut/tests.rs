@@ -475,6 +475,31 @@ fn every_clamped_pixel_is_its_own_best() {
     assert!(report.gap <= 1e-7 && report.rms <= report.max && report.p95 <= report.max, "{report:?}");
 }
 
+/// What is certified is the worst pixel, wherever it stands: more pixels after it take nothing back.
+#[test]
+fn the_gap_is_that_of_the_worst_pixel_so_far() {
+    let space = space();
+    // Few enough that none has to be chosen.
+    let process = InkSet::of([Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black]);
+    let printable = Printable::from_library(&Library::builtin(), &process, &space);
+    let part = |seed: usize| (seed * 7919 % 97) as f32 / 97.0;
+    let surfaces: Vec<Surface> = (0..24)
+        .map(|n| {
+            let diffuse = [part(n + 1), part(3 * n + 2), part(5 * n + 3)].map(|v| 0.8 * v);
+            surface(diffuse, [0.04 + 0.3 * part(7 * n + 4); 3], 0.05 + 0.4 * part(11 * n + 5))
+        })
+        .collect();
+    let gap = |count: usize| {
+        let field = Field { space: space.clone(), width: 1, surfaces: surfaces[..count].to_vec() };
+        let inks = GamutSettings { intent: Intent::Clamp, ..GamutSettings::default() };
+        let mapped = super::map::clamped(&field, &printable, &inks, &Silent).unwrap();
+        mapped.report.pixels.unwrap().gap
+    };
+    let gaps: Vec<f64> = (1..=surfaces.len()).map(gap).collect();
+    assert!(gaps.last() > gaps.first(), "{gaps:?}");
+    assert!(gaps.windows(2).all(|pair| pair[0] <= pair[1]), "{gaps:?}");
+}
+
 /// The result is equal bit for bit for any number of threads.
 #[test]
 fn mapping_is_the_same_with_any_number_of_threads() {
