@@ -10,7 +10,7 @@
 use protocol::ink::Ink;
 
 /// Names in addition to [`Ink::name`] and [`Ink::short`], with words joined by `-`.
-const ALSO: [(&str, Ink); 32] = [
+const ALSO: [(&str, Ink); 33] = [
     ("k", Ink::Black),
     ("key", Ink::Black),
     ("gold", Ink::MetallicGold),
@@ -28,6 +28,7 @@ const ALSO: [(&str, Ink); 32] = [
     ("spot-white", Ink::White),
     ("under-white", Ink::White),
     ("undercoat-white", Ink::White),
+    ("white-ink", Ink::White),
     ("process-black", Ink::Black),
     ("process-cyan", Ink::Cyan),
     ("process-magenta", Ink::Magenta),
@@ -43,6 +44,15 @@ const ALSO: [(&str, Ink); 32] = [
     ("photo-primer", Ink::Primer),
     ("mf", Ink::Primer),
     ("mf-ink", Ink::Primer),
+];
+
+/// What else shops call them. No slip of the hand is taken for these: `blank` is no `blanc`.
+const SHOPS: [(&str, Ink); 5] = [
+    ("weiss", Ink::White),
+    ("weiß", Ink::White),
+    ("bianco", Ink::White),
+    ("blanc", Ink::White),
+    ("clear", Ink::Finish),
 ];
 
 /// Japanese names, without what is written around them.
@@ -99,7 +109,7 @@ pub(crate) fn ink(text: &str) -> Option<Ink> {
         .map(str::to_lowercase)
         .collect();
     let name = words.join("-");
-    let also = || ALSO.iter().find(|(known, _)| *known == name).map(|&(_, ink)| ink);
+    let also = || ALSO.iter().chain(&SHOPS).find(|(known, _)| *known == name).map(|&(_, ink)| ink);
     Ink::from_name(&name).or_else(also).or_else(|| japanese(&name))
 }
 

@@ -208,7 +208,7 @@ mod tests {
 
     #[test]
     fn colours_and_steps_that_cannot_be_are_answered_with_what_can() {
-        for wrong in ["red=gold", "#ff0000", "#ff0000=jam", "#ffffff=gold", "#ff0000=gold,#ff0000=white"] {
+        for wrong in ["rouge=gold", "#ff0000", "#ff0000=jam", "#ffffff=gold", "#ff0000=gold,#ff0000=white"] {
             let error = read(&[pair("FoilpressColour", wrong)], None).unwrap_err().to_string();
             assert!(
                 error.ends_with("choose None or colours and their inks, such as #ff0000=gold"),

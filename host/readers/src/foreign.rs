@@ -75,6 +75,11 @@ fn archive(start: &[u8]) -> Option<Format> {
     let has = |word: &[u8]| start.windows(word.len()).any(|part| part == word);
     Some(if has(b"coreldraw") || has(b"corel") {
         ("a CorelDRAW drawing", DRAWING)
+    } else if has(b"Document.archive") {
+        (
+            "Procreate's own format",
+            "share its layers as PNG, and name each after its ink (white.png, gold.png, …)",
+        )
     } else if has(b"word/")
         || has(b"ppt/")
         || has(b"xl/")
@@ -93,6 +98,15 @@ fn text(start: &[u8]) -> Option<Format> {
     let (first, rest) = text.split_at(text.iter().position(u8::is_ascii_whitespace).unwrap_or(text.len()));
     if first == b"0" && rest.trim_ascii_start().starts_with(b"SECTION") {
         return Some(("DXF", DRAWING));
+    }
+    let has = |word: &[u8]| start.windows(word.len()).any(|part| part == word);
+    if begins(b"<") && has(b"LightBurnProject") {
+        return Some(("LightBurn's own format", "export it as SVG, and name its layers after their inks"));
+    }
+    // The language of plotters: initialise, or choose a pen first.
+    if [&b"IN;"[..], b"\x1b%-1BIN", b"\x1b%0BIN", b"SP1;", b"BPIN"].iter().any(|word| text.starts_with(word))
+    {
+        return Some(("a drawing for a plotter (HPGL)", DRAWING));
     }
     (begins(b"<!doctype html") || begins(b"<html"))
         .then_some(("a page of the web", "print it to a PDF from the browser"))

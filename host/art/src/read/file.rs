@@ -28,7 +28,7 @@ pub(crate) const PICTURE: Request<'static> = Request {
     planes: None,
     pixels: MOST_PIXELS,
     room: "a page at 1200 dpi",
-    besides: ", SVG, PDF or PostScript",
+    besides: ", OpenRaster, SVG, PDF or PostScript",
 };
 
 /// The first bytes of a file.

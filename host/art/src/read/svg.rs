@@ -1,17 +1,19 @@
 //! SVG drawings: layers named after inks, or one picture.
 //!
 //! Problem: drawing programs have layers, which SVG stores as groups with a label or an identifier.
-//! Method: the drawing is rendered at its final number of dots without anti-aliasing. [`find`] tells which parts of it are
-//! layers. Each layer is rendered as the whole drawing without all others, so the clips, masks and transforms around it
-//! hold, and what is drawn in it is ink, whatever its colour. Only a layer to be halftoned has tones: there dark is ink,
-//! and so it is in pictures made of pixels. A drawing has no ground. Without layers it is one picture; its edges are exact,
-//! so reserved colours are unambiguous. Nothing drawn is thinner than a dot ([`thin`]). What a drawing asks of the computer has
-//! [`bounds`]; what the renderer does not know is drawn by other means or named ([`styles`], [`strokes`], [`write`], [`unseen`]). Rendering
-//! has a thread of its own, because filters may take for ever, and the renderer may fail on hostile drawings.
-//! Cost: four bytes a dot while a layer is rendered, eight where it holds pictures. Limits: animations do not run; a layer
-//! may take as long as a page ([`process::limit`]). A thread cannot be stopped: one that takes too long ends with the
-//! program. A browser's machine has no threads: there a drawing is rendered in place, without a limit of
-//! time.
+//! Method: the drawing is rendered at its final number of dots without anti-aliasing. [`find`] tells which
+//! parts of it are layers. Each layer is rendered as the whole drawing without all others, so the clips,
+//! masks and transforms around it hold, and what is drawn in it is ink, whatever its colour. Only a layer
+//! to be halftoned has tones: there dark is ink, and so it is in pictures made of pixels. A drawing has no
+//! ground. Without layers it is one picture; its edges are exact, so reserved colours are unambiguous.
+//! Nothing drawn is thinner than a dot ([`thin`]). What a drawing asks of the computer has [`bounds`]; what
+//! the renderer does not know is drawn by other means or named ([`styles`], [`strokes`], [`write`],
+//! [`unseen`]). Rendering has a thread of its own, because filters may take for ever, and the renderer may
+//! fail on hostile drawings.
+//! Cost: four bytes a dot while a layer is rendered, eight where it holds pictures. Limits: animations do
+//! not run; a layer may take as long as a page ([`process::limit`]). A thread cannot be stopped: one that
+//! takes too long ends with the program. A browser's machine has no threads: there a drawing is rendered in
+//! place, without a limit of time.
 
 mod bounds;
 mod find;
@@ -112,13 +114,14 @@ impl Step {
     }
 }
 
-/// The text of a drawing with the styles that count, if they are not as written, and a note on those that do not.
+/// The text of a drawing with the styles that count, if they are not as written, and a note on those that
+/// do not.
 fn styled(path: &Path, text: &str) -> Result<(Option<String>, Option<String>), Diagnosis> {
     styles::resolved(path, &parsed(path, text)?, MOST_BYTES)
 }
 
-/// The layers of a drawing, what of it is for a cutter, and notes on it. What would take the renderer too long, or its stack, is an
-/// error.
+/// The layers of a drawing, what of it is for a cutter, and notes on it. What would take the renderer too
+/// long, or its stack, is an error.
 fn looked_at(
     path: &Path,
     document: &roxmltree::Document<'_>,
@@ -193,6 +196,12 @@ impl Drawing {
         };
         let whole = write::written(root, way);
         let size = renderer.tree(&whole)?.size();
+        if let Some(lost) = renderer.characters_without_glyph() {
+            notes.push(format!(
+                "{}: no font of this computer has the characters {lost}, so they are missing; convert the text to paths",
+                path.display()
+            ));
+        }
         if let Some(missing) = renderer.missing_fonts() {
             notes.push(format!(
                 "{}: this computer has no font {missing}; install it, or convert the text to paths",
@@ -313,8 +322,8 @@ fn links_drawing(root: nodes::Node<'_, '_>) -> bool {
     root.descendants().any(|node| nodes::name(node) == Some("image") && drawing(node))
 }
 
-/// The coverage of a layer that holds pictures: `rgba` with them, `shapes` without. Shapes are ink whatever their colour;
-/// pictures are ink where they are dark, for scans have white paper.
+/// The coverage of a layer that holds pictures: `rgba` with them, `shapes` without. Shapes are ink whatever
+/// their colour; pictures are ink where they are dark, for scans have white paper.
 fn with_pictures(
     path: &Path,
     size: (u32, u32),

@@ -41,6 +41,7 @@ const NONE: &str = "none";
     foilpress print sample:leaf --preset decal --size 60mm\n  \
     foilpress preset use decal         (apply it from now on without naming it)\n  \
     foilpress preset use none\n  \
+    foilpress preset remove decal\n  \
     foilpress preset list")]
 pub struct Args {
     #[command(subcommand)]
@@ -63,6 +64,11 @@ enum Command {
         /// Print JSON
         #[arg(long)]
         json: bool,
+    },
+    /// Remove a preset that was saved
+    Remove {
+        /// Name of the preset
+        name: String,
     },
     /// Apply a preset to every command that it fits, without naming it; `none` stops that
     Use {
@@ -210,6 +216,7 @@ pub fn run(args: &Args, program: &clap::Command) -> Result<()> {
     match &args.command {
         Command::Save { name, options } => save(name, options, program),
         Command::List { json } => list(*json),
+        Command::Remove { name } => remove(name),
         Command::Use { name } => apply(name),
     }
 }
@@ -238,7 +245,7 @@ fn save(name: &str, options: &[String], program: &clap::Command) -> Result<()> {
         .map(|(command, _)| command.get_name())
         .collect();
     let instead = match BUILT_IN.iter().any(|(known, _)| known == &name) {
-        true => "; it stands in for the built-in one of this name until its file is removed",
+        true => "; it stands in for the built-in one of this name until it is removed",
         false => "",
     };
     show(&format!("{}: {} (for {}){instead}\n", path.display(), words.join(" "), fits.join(", ")))
@@ -267,6 +274,29 @@ fn list(json: bool) -> Result<()> {
         format!("{name:<16} {words}{used}\n")
     };
     show(&presets.map(line).collect::<String>())
+}
+
+/// Removes a preset; if it is in use, none is from now on.
+fn remove(name: &str) -> Result<()> {
+    let path = folders::file(&presets()?, name)?;
+    match std::fs::remove_file(&path) {
+        Ok(()) => {}
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            if BUILT_IN.iter().any(|(known, _)| *known == name) {
+                bail!("preset `{name}` is built in and stays");
+            }
+            bail!("there is no preset `{name}` (there are: {})", names().unwrap_or_default().join(", "));
+        }
+        Err(error) => return Err(error).with_context(|| format!("cannot remove {}", path.display())),
+    }
+    let is_built_in = BUILT_IN.iter().any(|(known, _)| *known == name);
+    if in_use().as_deref() == Some(name) && !is_built_in {
+        apply(NONE)?;
+    }
+    show(&format!(
+        "removed preset `{name}`{}\n",
+        if is_built_in { "; the built-in one stands again" } else { "" }
+    ))
 }
 
 /// Applies a preset from now on, or none.

@@ -3,10 +3,10 @@
 //! Problem: the renderer draws text in a family that is not installed, and in `sans-serif`, in one family with serifs. Drawing programs show
 //! such text in another.
 //! Method: fontconfig, which drawing programs ask, names the installed family that stands for others (`fc-match`). Families that are not
-//! installed are reported with what stands for them. Without fontconfig the renderer's default stands for all.
+//! installed are reported with what stands for them, and so are characters that no font has. Without fontconfig the renderer's default stands for all.
 //! Cost: a program started for each list of families that does not begin with an installed one. Limits: [`MOST`] such lists.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -28,6 +28,8 @@ pub(super) const DEFAULT: &str = "serif";
 pub(super) struct Fonts {
     database: Arc<fontdb::Database>,
     stand_ins: Arc<Mutex<BTreeMap<String, StandIn>>>,
+    /// The characters that no font has.
+    without_glyph: Arc<Mutex<BTreeSet<char>>>,
 }
 
 /// What is drawn instead of a list of families.
@@ -42,7 +44,7 @@ struct StandIn {
 impl Fonts {
     /// No font at all.
     pub fn none() -> Fonts {
-        Fonts { database: Arc::default(), stand_ins: Arc::default() }
+        Fonts { database: Arc::default(), stand_ins: Arc::default(), without_glyph: Arc::default() }
     }
 
     /// Loads the fonts. The renderer draws text of a missing family in the default family and leaves it out if that is missing
@@ -65,7 +67,7 @@ impl Fonts {
             };
             fonts.set_serif_family(family);
         }
-        Ok(Fonts { database: Arc::new(fonts), stand_ins: Arc::default() })
+        Ok(Fonts { database: Arc::new(fonts), ..Fonts::none() })
     }
 
     pub fn is_empty(&self) -> bool {
@@ -86,8 +88,28 @@ impl Fonts {
                 Some(mut others) => usual(font, &mut others),
                 None => usual(font, fonts),
             }),
-            select_fallback: FontResolver::default_fallback_selector(),
+            select_fallback: Box::new({
+                let usual = FontResolver::default_fallback_selector();
+                let lost = self.without_glyph.clone();
+                move |character, tried, fonts| {
+                    let found = usual(character, tried, fonts);
+                    let mut lost = lost.lock().unwrap_or_else(PoisonError::into_inner);
+                    if found.is_none() && lost.len() < MOST {
+                        lost.insert(character);
+                    }
+                    found
+                }
+            }),
         }
+    }
+
+    /// The characters that no font has, in words.
+    pub fn characters(&self) -> Option<String> {
+        let lost = self.without_glyph.lock().unwrap_or_else(PoisonError::into_inner);
+        let shown =
+            |c: &char| if c.is_control() { format!("U+{:04X}", u32::from(*c)) } else { format!("`{c}`") };
+        let words: Vec<String> = lost.iter().map(shown).collect();
+        (!words.is_empty()).then(|| words.join(", "))
     }
 
     /// The families that are not installed, each with what is drawn instead, in words.

@@ -62,6 +62,11 @@ impl Renderer {
         self.fonts.missing()
     }
 
+    /// The characters of its text that no font has, in words.
+    pub fn characters_without_glyph(&self) -> Option<String> {
+        self.fonts.characters()
+    }
+
     /// Reads a drawing.
     pub fn parsed(&self, text: &str, without: Without) -> Result<Drawn, Diagnosis> {
         let met = Arc::new(Mutex::new(Met::default()));
