@@ -66,6 +66,17 @@ impl Layer {
     }
 }
 
+/// What knocks out white beneath it.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub enum Above {
+    /// Process inks.
+    Colours,
+    /// Another ink.
+    Ink(Ink),
+    /// A shape that is white as paper.
+    Paper,
+}
+
 /// Art at 600 dpi, or at 1200 x 600.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Artwork {
@@ -85,8 +96,10 @@ pub struct Artwork {
     pub drawn: Plane,
     /// Dots that are not transparent, if the art has transparency.
     pub opaque: Option<Plane>,
-    /// How many dots of white are knocked out by colours that are drawn over it.
-    pub knocked_out: u64,
+    /// The dots of white that make room for what is drawn over them, by what that is.
+    pub knocked_out: Vec<(Above, u64)>,
+    /// The dots of white that do not, though the art says so.
+    pub white_kept: u64,
     /// What is for a cutter and not printed, if it was asked for.
     pub cuts: Option<Plane>,
     /// What the reader had to assume, in sentences.
@@ -105,7 +118,8 @@ impl Artwork {
             colour: None,
             drawn: bitplane::blank(width, length),
             opaque: None,
-            knocked_out: 0,
+            knocked_out: Vec::new(),
+            white_kept: 0,
             cuts: None,
             notes: Vec::new(),
         }

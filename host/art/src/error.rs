@@ -183,6 +183,13 @@ pub(super) fn nothing(reason: impl fmt::Display) -> Diagnosis {
     Diagnosis::new(Fault::Nothing, format!("there is nothing to print: {reason}"))
 }
 
+/// All that a page has is for a cutter.
+pub(super) fn all_for_a_cutter(path: &Path) -> Diagnosis {
+    nothing(format!("all that {} has is for a cutter, which is never printed", path.display())).hint(
+        "--cut-lines FILE.svg writes it beside a print; to print it, give its spot colour the name of an ink",
+    )
+}
+
 /// Everything drawn is white, and the settings ask for no white.
 pub(super) fn only_white(name: &str) -> Diagnosis {
     nothing(format!("{name} is drawn in nothing but white, which is bare paper"))

@@ -26,7 +26,7 @@ mod options;
 mod read;
 mod window;
 
-pub use artwork::{Artwork, Layer, Shape};
+pub use artwork::{Above, Artwork, Layer, Shape};
 pub use colour::Colour;
 pub use colour::intent::Intent;
 pub use dots::compose::{

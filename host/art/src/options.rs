@@ -36,6 +36,8 @@ pub struct Options {
     pub cut_lines: bool,
     /// Whether white keeps the dots that colours drawn over it would knock out.
     pub keep_white: bool,
+    /// Other inks beneath which it keeps its dots.
+    pub over_white: InkSet,
     /// Room on the page: art without a size of its own is fitted to it.
     pub room: Room,
     /// Where the files stand, and what a drawing links.
@@ -98,6 +100,7 @@ impl Default for Options {
             inks: InkSet::default().with(Ink::White),
             cut_lines: false,
             keep_white: false,
+            over_white: InkSet::EMPTY,
             room: Room::default(),
             shelf: Arc::new(Disk),
         }

@@ -7,9 +7,10 @@ mod archives;
 mod damage;
 mod documents;
 mod drawings;
-mod exports;
+pub(crate) mod exports;
 mod files;
 mod hostile;
+mod knockout;
 mod layered;
 mod pages;
 mod pictures;
@@ -97,4 +98,17 @@ fn dots(mm: f64) -> f64 {
 
 fn near(found: u64, wanted: f64, share: f64) -> bool {
     (found as f64 / wanted - 1.0).abs() < share
+}
+
+/// The inks of art with their dots: of its layers, and of its colours.
+fn laid(art: &Artwork) -> Vec<(Ink, u64)> {
+    let settings = Settings { inks: inks::InkSet::of(Ink::ALL), order: Order::Given, ..Settings::default() };
+    let composed = compose(art, &settings, &inks::Library::builtin(), &Silent).unwrap();
+    let named = |laid: crate::InkLayer| (Ink::from_name(laid.ink).unwrap(), laid.dots);
+    composed.report.laid.into_iter().map(named).collect()
+}
+
+/// How many dots have an ink.
+fn dots_of(art: &Artwork, ink: Ink) -> u64 {
+    laid(art).into_iter().filter(|(found, _)| *found == ink).map(|(_, dots)| dots).sum()
 }

@@ -114,11 +114,27 @@ impl Choice for art::Text {
 
 impl Choice for Accept {
     const ALL: &'static [(Accept, &'static str, &'static str)] = &[
-        (Accept::FoilUndercoat, "foil-undercoat", "Solid cyan, magenta, yellow and black beneath every foil"),
-        (Accept::EvenWhite, "even-white", "Primer, finish and primer between black and the white above it"),
-        (Accept::WhiteThrice, "white-thrice", "Three layers of white instead of one"),
-        (Accept::SilverUnderWhite, "silver-under-white", "Metallic silver beneath white, for dark grounds"),
-        (Accept::WhiteKept, "white-kept", "White beneath the colours of a page that knock it out"),
+        (
+            Accept::FoilUndercoat,
+            Accept::FoilUndercoat.name(),
+            "Solid cyan, magenta, yellow and black beneath every foil",
+        ),
+        (
+            Accept::EvenWhite,
+            Accept::EvenWhite.name(),
+            "Primer, finish and primer between black and the white above it",
+        ),
+        (Accept::WhiteThrice, Accept::WhiteThrice.name(), "Three layers of white instead of one"),
+        (
+            Accept::SilverUnderWhite,
+            Accept::SilverUnderWhite.name(),
+            "Metallic silver beneath white, for dark grounds",
+        ),
+        (
+            Accept::WhiteKept,
+            Accept::WhiteKept.name(),
+            "White beneath the colours of a page that knock it out",
+        ),
     ];
 }
 

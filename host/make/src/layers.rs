@@ -5,7 +5,7 @@
 
 use std::path::PathBuf;
 
-use art::{Artwork, Composed, Finish, Remedy, Room, White};
+use art::{Accept, Artwork, Composed, Finish, Remedy, Room, White};
 use inks::{InkSet, Library};
 use observe::{Diagnosis, Observer};
 use press::job::Handling;
@@ -99,6 +99,21 @@ impl Settings {
     }
 }
 
+impl Settings {
+    /// How the art is read for what its print needs: on film, white lies beneath colours, whose program
+    /// left it out there as on white paper; beneath metals it stays where they knock nothing out.
+    #[must_use]
+    pub fn reading(&self) -> art::Options {
+        let Settings { read, compose, page, .. } = self;
+        let metals = Ink::ALL.into_iter().filter(|ink| ink.kind() == Kind::Metallic);
+        art::Options {
+            keep_white: compose.accept.contains(&Accept::WhiteKept) || page.handling.is_film(),
+            over_white: InkSet::of(metals.filter(|&metal| !compose.knockout.contains(metal))),
+            ..read.clone()
+        }
+    }
+}
+
 /// Art as dots, and everything that decides its print.
 pub struct Layers<'a> {
     name: &'a str,
@@ -126,11 +141,8 @@ impl<'a> Layers<'a> {
         let (width, length) = layout.largest();
         let across = layout.resolution.across(1);
         let room = Room { width, length, cut: layout.cut };
-        let art = art::open(
-            files,
-            &art::Options { across: across.into(), room, ..settings.read.clone() },
-            observer,
-        )?;
+        let art =
+            art::open(files, &art::Options { across: across.into(), room, ..settings.reading() }, observer)?;
         // Before the long work.
         layout::check(art.width / usize::from(across), art.length, layout).map_err(JobError::from)?;
         Ok(art)

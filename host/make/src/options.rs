@@ -402,8 +402,8 @@ pub static CURL: PageOption = PageOption {
 /// Colours out of reach.
 pub static INTENT: PageOption = PageOption {
     name: "intent",
-    help: "What is printed for colours that the inks do not reach",
-    more: "",
+    help: "Which mixtures of inks stand for colours: those of photographs, or those of drawings",
+    more: "It decides for every colour of the art, not only for those that the inks do not reach.",
     keyword: "FoilpressIntent",
     text: "Colours out of reach",
     values: &[
@@ -539,7 +539,7 @@ pub static COLOUR: PageOption = PageOption {
 /// Difference from such a colour.
 pub static TOLERANCE: PageOption = PageOption {
     name: "tolerance",
-    help: "Largest difference of red, green and blue from a colour that stands for an ink, 0 to 60 [default: 8 for the vendor's white and black, 12 for others]",
+    help: "Largest difference from a colour that stands for an ink, in steps of red, green and blue (each 0 to 255): 0 to 60 [default: 8 for the vendor's white and black, 12 for others]",
     more: "",
     keyword: "FoilpressTolerance",
     text: "Difference from such a colour",

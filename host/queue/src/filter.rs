@@ -12,15 +12,12 @@
 //! Limits: documents of 1 GB and 1000 pages, sheets the printer takes, upright. Transparency is gone when a page has been
 //! drawn, so white cannot follow it.
 
-mod drawing;
 mod page;
 
-use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
 use std::path::Path;
 
 use inks::Library;
-use memchr::memmem;
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 use tempfile::NamedTempFile;
@@ -28,9 +25,8 @@ use tempfile::NamedTempFile;
 use super::options::NoChoice;
 use super::raster::{self, RasterError};
 use art::Page;
-use art::pdf::{Interpreter, Survey};
-use art::process::MOST_PAGES;
-use drawing::Drawing;
+use art::pdf::{DrawError, Drawer, Drawing, Interpreter, Part, Survey, Suspected};
+use art::process::{MOST_PAGES, ProcessError};
 use make::options::{Choices, Spots, is_chosen};
 use observe::{Diagnosis, Fault, Observer};
 use page::Press;
@@ -259,7 +255,7 @@ fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
     if let Some(doubt) = art::pdf::cut_short(path) {
         press.observer.note(&doubt);
     }
-    let suspected = Suspected::of(path)?;
+    let suspected = Suspected::of(path).map_err(io_error("read the document"))?;
     let whole = |interpreter| Survey { spots: Vec::new(), interpreter };
     let Survey { spots, interpreter } = match press.choices.spots {
         Spots::None if suspected.gradients => whole(art::pdf::interpreter(path)),
@@ -277,16 +273,19 @@ fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
         press.observer.note(art::pdf::OLDER);
     }
     if spots.iter().all(Vec::is_empty) {
-        return drawn((path, interpreter), None, press);
+        return drawn((path, interpreter), (None, suspected.overprint), press);
     }
     for (number, plates) in (1..).zip(&spots) {
         if plates.is_empty() {
-            drawn((path, interpreter), Some(number), press)?;
+            drawn((path, interpreter), (Some(number), suspected.overprint), press)?;
             continue;
         }
-        press.observer.note(&format!("page {number}: {} printed as inks", plates.join(", ")));
         let in_page = |error| FilterError::Layers { page: number, source: of_document(error) };
         let page = art::pdf::separated(path, interpreter, number, dpi.into()).map_err(in_page)?;
+        let spots: Vec<&str> = page.spots().collect();
+        if !spots.is_empty() {
+            press.observer.note(&format!("page {number}: {} printed as inks", spots.join(", ")));
+        }
         let paper = page::paper(number, page.size, dpi, press.choices)?;
         if let Some(view) = press.view(number, paper, (page.size, dpi), page.bounds(), false)? {
             let art = page.art(&format!("page {number}"), &press.options(dpi)).map_err(in_page)?;
@@ -310,29 +309,50 @@ fn within_limit(number: usize) -> Result<(), FilterError> {
 /// Pages as Ghostscript draws them, or one of them.
 fn drawn(
     (path, interpreter): (&Path, Interpreter),
-    only: Option<usize>,
+    (only, overprints): (Option<usize>, bool),
     press: &mut Press<'_>,
 ) -> Result<(), FilterError> {
     let dpi = press.choices.dpi;
-    let mut drawing = Drawing::begin(path, interpreter, only, dpi)?;
+    let page = only.and_then(|page| u32::try_from(page).ok());
+    let drawing = Drawing {
+        path,
+        interpreter,
+        page,
+        part: Part::Sheet,
+        dpi: (dpi.into(), dpi.into()),
+        overprints,
+        // Print systems draw sheets, not transparent ones.
+        has_ground: false,
+    };
+    let mut drawer = Drawer::begin(&drawing).map_err(undrawn)?;
     let first = only.unwrap_or(1);
     let mut number = first;
-    while let Some(size) = drawing.next_page()? {
+    while let Some(size) = drawer.next_page().map_err(undrawn)? {
         within_limit(number)?;
         let paper = page::paper(number, size, dpi, press.choices)?;
-        let job = picture(number, paper, (size, dpi), drawing.page(size)?, false, press)?;
+        let page = drawer.page(size).map_err(undrawn)?;
+        let job = picture(number, paper, (size, dpi), page, false, press)?;
         press.write(&job)?;
         number += 1;
     }
-    let said = drawing.end()?;
+    let said = drawer.end().map_err(undrawn)?;
     if number == first {
-        let page = only.and_then(|page| u32::try_from(page).ok());
         return Err(FilterError::NoPage(art::pdf::no_page(&said, page)));
     }
     if let Some(damage) = art::pdf::damaged(&said) {
         press.observer.note(&damage);
     }
     Ok(())
+}
+
+/// Why there is no drawing.
+fn undrawn(error: DrawError) -> FilterError {
+    match error {
+        DrawError::Process(ProcessError::Start(error)) => FilterError::NoGhostscript(error),
+        DrawError::Process(error) => FilterError::Ghostscript(observe::with_causes(&error)),
+        DrawError::Folder(source) => FilterError::Io { what: "make a temporary folder", source },
+        DrawError::Read(source) => FilterError::Io { what: "read what Ghostscript draws", source },
+    }
 }
 
 /// The job of a page that is a picture; empty if nothing is on it.
@@ -352,41 +372,6 @@ fn picture(
         .art(&name, dpi, &press.options(dpi))
         .map_err(|source| FilterError::Layers { page: number, source })?;
     press.job(number, paper, &art, &view, mirrored)
-}
-
-/// What the words of a document let suspect, or that parts of it are packed.
-struct Suspected {
-    /// Spot colours; also if it is a program.
-    spots: bool,
-    /// Gradients that not every interpreter draws ([`art::pdf::interpreter`]).
-    gradients: bool,
-}
-
-impl Suspected {
-    fn of(path: &Path) -> Result<Suspected, FilterError> {
-        const PACKED: &[u8] = b"/ObjStm";
-        const SPOTS: [&[u8]; 3] = [b"/Separation", b"/DeviceN", PACKED];
-        const SHADING: &[u8] = b"/ShadingType";
-        /// More than the words and the white space within them.
-        const LONGEST: usize = 64;
-        let mut found = Suspected { spots: false, gradients: false };
-        let mut file = File::open(path).map_err(io_error("read the document"))?.take(LARGEST);
-        let mut part = Vec::new();
-        loop {
-            // A word may lie across two parts.
-            part.drain(..part.len().saturating_sub(LONGEST - 1));
-            let before = part.len();
-            (&mut file).take(1 << 20).read_to_end(&mut part).map_err(io_error("read the document"))?;
-            if part.len() == before || found.spots && found.gradients {
-                return Ok(found);
-            }
-            let program = before == 0 && part.starts_with(b"%!");
-            found.spots |= program || SPOTS.iter().any(|word| memmem::find(&part, word).is_some());
-            let by_two = |at: usize| part[at + SHADING.len()..].trim_ascii_start().starts_with(b"1");
-            found.gradients |=
-                memmem::find(&part, PACKED).is_some() || memmem::find_iter(&part, SHADING).any(by_two);
-        }
-    }
 }
 
 #[cfg(test)]
@@ -566,31 +551,6 @@ mod tests {
         let usual = read(&[], None).unwrap();
         let error = page::paper(3, (7016, 4961), 600, &usual).unwrap_err().to_string();
         assert!(error.contains("page 3 is 297 x 210 mm") && error.contains("215.9 x 355.6 mm"), "{error}");
-    }
-
-    #[test]
-    fn spot_colours_and_gradients_are_suspected_wherever_their_words_begin() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("document");
-        let suspected = |bytes: &[u8]| {
-            std::fs::write(&path, bytes).unwrap();
-            let found = Suspected::of(&path).unwrap();
-            (found.spots, found.gradients)
-        };
-        assert_eq!(suspected(b"%!PS"), (true, false));
-        assert_eq!(suspected(b"%PDF-1.4 /DeviceRGB /DeviceCMYK /Separa tion /ShadingType 2"), (false, false));
-        assert_eq!(suspected(b"%PDF-1.4 /ShadingType 3 /ShadingType\r\n1"), (false, true));
-        assert_eq!(suspected(b"%PDF-1.5 /ObjStm"), (true, true));
-        // Before, across and after the border of two parts.
-        for at in (1 << 20) - 20..(1 << 20) + 3 {
-            let with = |word: &[u8]| {
-                let mut bytes = vec![b' '; 3 << 20];
-                bytes[at..at + word.len()].copy_from_slice(word);
-                bytes
-            };
-            assert_eq!(suspected(&with(b"/Separation")), (true, false), "{at}");
-            assert_eq!(suspected(&with(b"/ShadingType 1")), (false, true), "{at}");
-        }
     }
 
     #[test]

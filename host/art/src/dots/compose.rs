@@ -86,6 +86,7 @@ pub fn compose(
     if art.width as u64 * art.length as u64 == 0 {
         return Err(too_small(art.width as f64 * MM, art.length as f64 * MM));
     }
+    suggest::white_beneath(art.white_kept, &art.knocked_out).for_each(&mut tell);
     let (mut separations, picked) = drawn_separations(art, settings, library, observer, &mut tell)?;
     underbase::lay_white(&mut separations, art, settings, &mut tell)?;
     underbase::lay_finish(&mut separations, art, settings)?;
@@ -118,6 +119,21 @@ pub fn compose(
             .collect::<Vec<_>>()
             .join(", ");
         return Err(too_many_passes(passes, &inks));
+    }
+    for &accepted in &settings.accept {
+        let without = settings.accept.iter().copied().filter(|other| *other != accepted).collect();
+        let without = Settings { accept: without, ..settings.clone() };
+        let planes: Vec<&Plane> = separations.iter().map(|separation| &separation.plane).collect();
+        let census = pack::census(&planes, art.width, art.length);
+        let is_idle = match accepted {
+            Accept::WhiteKept => art.white_kept == 0,
+            _ => census.iter().enumerate().filter(|(_, count)| **count > 0).all(|(mask, _)| {
+                layers(&separations, mask, settings) == layers(&separations, mask, &without)
+            }),
+        };
+        if is_idle {
+            tell(accepted.note());
+        }
     }
     // White and finish beneath and on them make other stacks of what was picked.
     let is_bare = matches!(settings.white, None | Some(White::None))
@@ -381,7 +397,7 @@ fn stack_up(
     let order: Vec<Ink> = separations.iter().map(|separation| separation.ink).collect();
     let mut suggestions = suggest::suggest(dots.stacks(), &counts, &order);
     suggestions.extend(suggest::rare(&laid));
-    suggestions.extend(suggest::knocked_out(art.knocked_out));
+    suggestions.extend(suggest::knocked_out(&art.knocked_out));
     let size_mm = ((width / art.across) as f64 * MM, length as f64 * MM);
     Ok(Composed { report: Report { size_mm, laid, bare: counts[0], notes }, dots, suggestions })
 }

@@ -92,6 +92,11 @@ impl Order {
         })
     }
 
+    /// The number of the byte that is the tag.
+    pub(crate) fn tag(self) -> usize {
+        if self == Order::First { 0 } else { BYTES - 1 }
+    }
+
     /// Brings the tags of pixels to the front.
     pub(crate) fn turn(self, pixels: &mut [u8]) {
         if self == Order::Last {

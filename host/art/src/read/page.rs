@@ -1,9 +1,10 @@
 //! A page in memory, as a print queue has it.
 //!
-//! Problem: print systems hand over whole sheets, most of which is bare, at four bytes a pixel; and most pages are black text.
-//! Method: as long as a page is black and white alone, it is kept as one bit a pixel while it is read: what drew a black pixel
-//! does not matter. With the first other colour, its pixels become numbers of colours (`indexed_page`), and with the first tone of a
-//! picture, pixels. So the whole page is read as a picture.
+//! Problem: print systems hand over whole sheets, most of which is bare, at four bytes a pixel; and most
+//! pages are black text.
+//! Method: as long as a page is black and white alone, it is kept as one bit a pixel while it is read: what
+//! drew a black pixel does not matter. With the first other colour, its pixels become numbers of colours
+//! (`indexed_page`), and with the first tone of a picture, pixels. So the whole page is read as a picture.
 //! Cost: 1 ns a pixel; a bit, a byte or four bytes. Limits: no transparency.
 
 use std::io::{self, Read};
@@ -12,6 +13,7 @@ use std::path::Path;
 use crate::artwork::Artwork;
 use crate::colour::Colour;
 use crate::dots::bitplane;
+use crate::dots::resample;
 use crate::error::wrong;
 use crate::options::Options;
 use crate::read::indexed_page::Numbered;
@@ -25,11 +27,12 @@ use sheet::Plane;
 
 /// Rows that are read at once: they stay in the cache.
 const ROWS: usize = 32;
-/// Resolution at which a pixel is a dot, so that nothing is resampled.
-const DOTS: u16 = 600;
-
 /// The pixels of a page, row by row from the top, without transparency.
-pub struct Page(Pixels);
+pub struct Page {
+    pixels: Pixels,
+    /// Where something is drawn, white included, if that was asked for.
+    ground: Option<Plane>,
+}
 
 enum Pixels {
     /// One bit a pixel: black or white.
@@ -45,14 +48,26 @@ enum Pixels {
 impl Page {
     /// A page of sRGB, three bytes a pixel.
     pub fn plain(rgb: Vec<u8>, width: usize) -> Page {
-        Page(Pixels::Plain(rgb, width))
+        Page { pixels: Pixels::Plain(rgb, width), ground: None }
     }
 
     /// Reads a page with tags ([`object_type`]) in this order, of so many pixels across and down.
+    /// `has_ground` tells bare paper apart from what is drawn in white.
     ///
     /// # Errors
     /// Those of reading.
-    pub fn read(input: &mut impl Read, order: Order, (width, height): (usize, usize)) -> io::Result<Page> {
+    pub fn read(
+        input: &mut impl Read,
+        order: Order,
+        (width, height): (usize, usize),
+        has_ground: bool,
+    ) -> io::Result<Page> {
+        let mut ground = has_ground.then(|| bitplane::blank(width, height));
+        let mut tell = |top: usize, pixels: &[u8]| {
+            let Some(ground) = &mut ground else { return };
+            let rows = ground.bits[ground.stride * top..].chunks_exact_mut(ground.stride);
+            rows.zip(pixels.chunks_exact(BYTES * width)).for_each(|(bits, row)| drawn(row, bits));
+        };
         let mut plane = bitplane::blank(width, height);
         let mut numbered: Option<Numbered> = None;
         let mut strip = vec![0; BYTES * width * ROWS.min(height)];
@@ -61,6 +76,7 @@ impl Page {
             let strip = &mut strip[..BYTES * width * ROWS.min(height - top)];
             input.read_exact(strip)?;
             order.turn(strip);
+            tell(top, strip);
             if numbered.is_none() {
                 let rows = plane.bits[plane.stride * top..].chunks_exact_mut(plane.stride);
                 if rows.zip(strip.chunks_exact(BYTES * width)).all(|(bits, row)| black(row, bits)) {
@@ -79,14 +95,15 @@ impl Page {
             these.copy_from_slice(strip);
             input.read_exact(rest)?;
             order.turn(rest);
-            return Ok(Page(Pixels::Tagged(pixels, width)));
+            tell(top + strip.len() / (BYTES * width), rest);
+            return Ok(Page { pixels: Pixels::Tagged(pixels, width), ground });
         }
-        Ok(Page(numbered.map_or(Pixels::Black(plane), Pixels::Numbered)))
+        Ok(Page { pixels: numbered.map_or(Pixels::Black(plane), Pixels::Numbered), ground })
     }
 
     /// The window around everything that is not white; `None` for a blank page.
     pub fn bounds(&self) -> Option<Window> {
-        match &self.0 {
+        match &self.pixels {
             Pixels::Black(plane) => bitplane::bounds(plane),
             Pixels::Numbered(page) => page.bounds(),
             Pixels::Plain(rgb, width) => Window::around(rgb, *width, 3, 255),
@@ -99,47 +116,88 @@ impl Page {
     /// # Errors
     /// No dots, or more than 65535 on a side.
     pub fn art(self, name: &str, dpi: u16, options: &Options) -> Result<Artwork, Diagnosis> {
-        let (width, height) = match &self.0 {
-            Pixels::Black(plane) => (plane.width, plane.length),
-            Pixels::Numbered(page) => (page.width, page.length()),
-            Pixels::Plain(rgb, width) => (*width, rgb.len() / 3 / (*width).max(1)),
-            Pixels::Tagged(pixels, width) => (*width, pixels.len() / BYTES / (*width).max(1)),
-        };
+        let (width, height) = self.size();
         let problem = || {
             let problem =
                 format!("the page is {width} x {height} pixels; expected 1 to 65535 dots on a side");
             wrong(Path::new(name), problem)
         };
         let dots = size::page_dots((width, height), dpi.into()).ok_or_else(problem)?;
-        let side = |pixels: usize| u32::try_from(pixels).map_err(|_| problem());
-        let size = (side(width)?, side(height)?);
-        Ok(match self.0 {
-            Pixels::Black(plane) if dpi == DOTS && !options.reserves() => {
-                let colour = Some(Colour::black(plane.clone()));
+        u32::try_from(width).and(u32::try_from(height)).map_err(|_| problem())?;
+        Ok(self.at(name, dots, options))
+    }
+
+    /// Pixels across and down.
+    fn size(&self) -> (usize, usize) {
+        match &self.pixels {
+            Pixels::Black(plane) => (plane.width, plane.length),
+            Pixels::Numbered(page) => (page.width, page.length()),
+            Pixels::Plain(rgb, width) => (*width, rgb.len() / 3 / (*width).max(1)),
+            Pixels::Tagged(pixels, width) => (*width, pixels.len() / BYTES / (*width).max(1)),
+        }
+    }
+
+    /// The pixels with their tags.
+    pub(super) fn pixels(self) -> Vec<u8> {
+        let (width, height) = self.size();
+        let expanded = |expand: &dyn Fn(&mut [u8])| {
+            let mut pixels = vec![0; BYTES * width * height];
+            expand(&mut pixels);
+            pixels
+        };
+        match self.pixels {
+            Pixels::Black(plane) => expanded(&|pixels| expand(&plane, pixels)),
+            Pixels::Numbered(page) => expanded(&|pixels| page.expand(pixels)),
+            Pixels::Plain(pixels, _) => {
+                let tagged = |&[r, g, b]: &[u8; 3]| [ObjectType::PICTURE, r, g, b];
+                pixels.as_chunks::<3>().0.iter().flat_map(tagged).collect()
+            }
+            Pixels::Tagged(pixels, _) => pixels,
+        }
+    }
+
+    /// The page as art of so many dots; its sides fit in 32 bits.
+    pub(super) fn at(mut self, name: &str, dots: (usize, usize), options: &Options) -> Artwork {
+        let size = self.size();
+        let is_dots = size == dots && !options.reserves();
+        let ground = self.ground.take();
+        let opaque = ground.map(|ground| {
+            let classes = || {
+                let has = |at: usize| u8::from(bitplane::at(&ground, at % size.0, at / size.0));
+                let sides = (size.0 as u32, size.1 as u32);
+                resample::classes((0..size.0 * size.1).map(has).collect(), sides, dots)
+            };
+            if size == dots { ground } else { bitplane::from_bytes(dots.0, &classes(), |byte| byte > 0) }
+        });
+        let art = match self.pixels {
+            Pixels::Black(plane) if is_dots => {
+                let colour = (plane.dots() > 0).then(|| Colour::black(plane.clone()));
                 Artwork { drawn: plane, colour, ..Artwork::blank(name, dots) }
             }
-            Pixels::Black(plane) => {
-                let mut pixels = vec![0; BYTES * width * height];
-                expand(&plane, &mut pixels);
-                tagged(name, pixels, size, dots, options)
-            }
-            Pixels::Numbered(page) if dpi == DOTS && !options.reserves() => {
+            Pixels::Numbered(page) if is_dots => {
                 let (colour, drawn) = page.colour();
                 Artwork { drawn, colour, ..Artwork::blank(name, dots) }
             }
-            Pixels::Numbered(page) => {
-                let mut pixels = vec![0; BYTES * width * height];
-                page.expand(&mut pixels);
-                tagged(name, pixels, size, dots, options)
+            Pixels::Plain(rgb, _) => {
+                let size = (size.0 as u32, size.1 as u32);
+                picture::opaque_artwork::<3>(name, name, size, dots, rgb, options)
             }
-            Pixels::Tagged(pixels, _) => tagged(name, pixels, size, dots, options),
-            Pixels::Plain(rgb, _) => picture::opaque_artwork::<3>(name, name, size, dots, rgb, options),
-        })
+            pixels => {
+                let pixels = Page { pixels, ground: None }.pixels();
+                let size = (size.0 as u32, size.1 as u32);
+                picture::opaque_artwork::<BYTES>(name, name, size, dots, pixels, options)
+            }
+        };
+        Artwork { opaque: opaque.or(art.opaque), ..art }
     }
 }
 
-fn tagged(name: &str, pixels: Vec<u8>, size: (u32, u32), dots: (usize, usize), options: &Options) -> Artwork {
-    picture::opaque_artwork::<BYTES>(name, name, size, dots, pixels, options)
+/// Sets the bits of the pixels of a row that something drew.
+fn drawn(row: &[u8], bits: &mut [u8]) {
+    for (bits, eight) in bits.iter_mut().zip(row.chunks(BYTES * 8)) {
+        let pixels = eight.as_chunks::<BYTES>().0.iter().zip(0..8);
+        *bits = pixels.fold(0, |bits, (pixel, at)| bits | u8::from(pixel[0] != 0) << (7 - at));
+    }
 }
 
 /// Sets the bits of the black pixels of a row, if the others are white.
@@ -213,16 +271,17 @@ mod tests {
             let is_black = tone.is_none() && colours.is_empty();
             let pixels = page((width, height), seed, (colours, most), tone);
             let found = match tag_last {
-                false => Page::read(&mut &pixels[..], Order::First, (width, height)).unwrap(),
+                false => Page::read(&mut &pixels[..], Order::First, (width, height), true).unwrap(),
                 true => {
                     let turned: Vec<u8> =
                         pixels.as_chunks::<BYTES>().0.iter().flat_map(|&[tag, r, g, b]| [r, g, b, tag]).collect();
-                    Page::read(&mut &turned[..], Order::Last, (width, height)).unwrap()
+                    Page::read(&mut &turned[..], Order::Last, (width, height), true).unwrap()
                 }
             };
-            let whole = Page(Pixels::Tagged(pixels, width));
-            prop_assert_eq!(matches!(found.0, Pixels::Black(_)), is_black);
-            let numbered = matches!(found.0, Pixels::Numbered(_));
+            let tags = bitplane::from(width, pixels.as_chunks::<BYTES>().0, |pixel| pixel[0] != 0);
+            let whole = Page { pixels: Pixels::Tagged(pixels, width), ground: Some(tags) };
+            prop_assert_eq!(matches!(found.pixels, Pixels::Black(_)), is_black);
+            let numbered = matches!(found.pixels, Pixels::Numbered(_));
             prop_assert!(!numbered || tone.is_none() && !is_black);
             prop_assert!(numbered || tone.is_some() || is_black || most > 5);
             prop_assert_eq!(found.bounds(), whole.bounds());
@@ -230,6 +289,7 @@ mod tests {
             let found = found.art("page", dpi, &options).unwrap();
             let whole = whole.art("page", dpi, &options).unwrap();
             prop_assert_eq!(&found.drawn, &whole.drawn);
+            prop_assert_eq!(&found.opaque, &whole.opaque);
             // What nothing is drawn on has no colour.
             if whole.drawn.dots() > 0 {
                 let dots = (whole.width, whole.length);
@@ -242,6 +302,6 @@ mod tests {
     #[test]
     fn a_page_cut_short_is_an_error() {
         let pixels = page((9, 40), 1, (Vec::new(), 1), None);
-        assert!(Page::read(&mut &pixels[..pixels.len() - 1], Order::First, (9, 40)).is_err());
+        assert!(Page::read(&mut &pixels[..pixels.len() - 1], Order::First, (9, 40), false).is_err());
     }
 }

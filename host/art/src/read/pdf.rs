@@ -1,41 +1,50 @@
 //! PDF and PostScript pages, through Ghostscript as a process.
 //!
-//! Problem: pages have spot plates and transparent backgrounds, and their languages are large. A document has several pages,
-//! and nothing of it may be lost in silence.
-//! Method: drafts of all pages tell which hold art. If several do, the user chooses one, or names an ink for
-//! each. A page with spot colours that name inks is separated at its final number of dots. Any other page is drawn with the
-//! kind of each pixel ([`object_type`](crate::read::object_type)), on a transparent background.
-//! Cost: seconds a page. Limits: a time limit for each page ([`process`](crate::read::process)).
+//! Problem: pages have spot plates and transparent backgrounds, and their languages are large. A document
+//! has several pages, and nothing of it may be lost in silence.
+//! Method: one page is drawn with the kind of each pixel ([`Drawer`]), on a transparent background. Drafts
+//! tell of all pages only where the document may have spot colours ([`Suspected`]), has several pages, or
+//! is printed in a size that is not its own. If several hold art, the user chooses one, or names an ink for
+//! each. A page with spot colours that name inks is separated at its final number of dots.
+//! Cost: that of Ghostscript, and a tenth for what becomes of it. Limits: a time limit for each page
+//! ([`process`](crate::read::process)).
 
 mod complaint;
 pub mod conversion;
 mod draw;
+mod drawer;
 mod eps;
 mod ghostscript;
+mod objects;
 mod optional;
 mod plates;
+mod suspected;
 
-use std::path::Path;
+use std::fs::File;
+use std::io::{Read as _, Seek as _, SeekFrom};
+use std::path::{Path, PathBuf};
 
 use protocol::ink::{Ink, Kind};
 
 use crate::artwork::{Artwork, Layer};
-use crate::error::{io, no_dot, nothing, several_pages, wrong};
+use crate::error::{all_for_a_cutter, io, no_dot, nothing, several_pages, wrong};
 use crate::options::{Options, Pages};
 use crate::read::coverage::Scan;
 use crate::read::file;
 use crate::read::names::{self, stem};
-use crate::read::picture;
 use crate::read::size::{self, Unstated};
-use draw::{DRAFT, Drafts, Leaf, Part, Tagged};
+use draw::{DRAFT, Drafts, Leaf};
 use files::scratch::Scratch;
 use files::shelf::Disk;
 use observe::{Diagnosis, Observer};
 use readers::Raster;
 
 pub use complaint::{OLDER, cut_short, damaged, no_page};
+pub use draw::Part;
+pub use drawer::{DrawError, Drawer, Drawing};
 pub use ghostscript::{Interpreter, command, interpreter, order};
 pub use plates::{Separated, Survey, separated, survey};
+pub use suspected::Suspected;
 
 /// How far from the beginning of a file readers look for the header of a PDF. Source: Adobe's implementation
 /// note 13 to PDF 1.7, appendix H.
@@ -46,7 +55,8 @@ pub(crate) fn is_document(start: &[u8]) -> bool {
     is_pdf(start) || start.starts_with(b"%!") || start.starts_with(eps::WITH_PREVIEW)
 }
 
-/// Whether these are the first bytes of a PDF. Spoolers and mail programs write a few lines before its header.
+/// Whether these are the first bytes of a PDF. Spoolers and mail programs write a few lines before its
+/// header.
 fn is_pdf(start: &[u8]) -> bool {
     let other = || {
         readers::is_picture(start) || start.trim_ascii_start().starts_with(b"<") || start.starts_with(b"%!")
@@ -64,16 +74,54 @@ pub(crate) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
         );
     }
     let folder = Scratch::new().map_err(io(path, "make a folder for its pages"))?;
+    let Some(bare) = from_its_header(path, &folder).map_err(io(path, "read it"))? else {
+        return drawn(path, options, observer);
+    };
+    let (bare_name, name) = (bare.display().to_string(), path.display().to_string());
+    let mut art = drawn(&bare, options, observer).map_err(|error| error.calling_it(&name))?;
+    art.notes.iter_mut().for_each(|note| *note = note.replace(&bare_name, &name));
+    Ok(art)
+}
+
+/// A copy of a PDF without what spoolers and mail programs write before it, of the same name: its places
+/// count from its header, and to Ghostscript they would be wrong. `None` if nothing stands there.
+fn from_its_header(path: &Path, folder: &Scratch) -> std::io::Result<Option<PathBuf>> {
+    let mut file = File::open(path)?;
+    let mut start = Vec::new();
+    (&mut file).take(HEADER as u64).read_to_end(&mut start)?;
+    let header = is_pdf(&start).then(|| start.windows(5).position(|word| word == b"%PDF-")).flatten();
+    let Some(at) = header.filter(|at| *at > 0) else { return Ok(None) };
+    file.seek(SeekFrom::Start(at as u64))?;
+    let copy = folder.path().join(path.file_name().unwrap_or_default());
+    std::io::copy(&mut file, &mut File::create(&copy)?)?;
+    Ok(Some(copy))
+}
+
+/// What is drawn of a document.
+fn drawn(path: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, Diagnosis> {
     let only = options.page();
     observer.begin("reading pages", 2);
-    let (Drafts { leaves, said }, interpreter) = draw::drafts(path, only, Part::CropBox, &folder)?;
+    let suspected = Suspected::of(path).map_err(io(path, "read it"))?;
+    let drawn = match suspected.spots || options.size.is_some() || matches!(options.pages, Pages::Inks(_)) {
+        true => None,
+        false => drawn_at_once(path, suspected, options)?,
+    };
     observer.advance(1);
-    let first = leaves.first().ok_or_else(|| wrong(path, no_page(&said, only)))?;
-    let document = Document { path, interpreter, folder: &folder, options };
-    let mut art = match &options.pages {
-        Pages::Number(_) => document.page(first)?,
-        Pages::Only => document.only_page(&leaves)?,
-        Pages::Inks(inks) => document.pages_of_inks(&leaves, inks, observer)?,
+    let (mut art, said, interpreter) = match drawn {
+        Some(drawn) => drawn,
+        None => {
+            let folder = Scratch::new().map_err(io(path, "make a folder for its pages"))?;
+            let (Drafts { leaves, said }, interpreter) = draw::drafts(path, only, Part::CropBox, &folder)?;
+            let first = leaves.first().ok_or_else(|| wrong(path, no_page(&said, only)))?;
+            let document =
+                Document { path, interpreter, folder: &folder, options, overprints: suspected.overprint };
+            let art = match &options.pages {
+                Pages::Number(_) => document.page(first)?,
+                Pages::Only => document.only_page(&leaves)?,
+                Pages::Inks(inks) => document.pages_of_inks(&leaves, inks, observer)?,
+            };
+            (art, said, interpreter)
+        }
     };
     observer.end();
     let place = |note: String| format!("{}: {note}", path.display());
@@ -89,12 +137,71 @@ pub(crate) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     Ok(art)
 }
 
+/// The page of a document that has no spot colours, as it is large, what Ghostscript said, and what read
+/// it; `None` if there is a choice of pages.
+fn drawn_at_once(
+    path: &Path,
+    suspected: Suspected,
+    options: &Options,
+) -> Result<Option<(Artwork, String, Interpreter)>, Diagnosis> {
+    let interpreter = if suspected.gradients { interpreter(path) } else { Interpreter::Usual };
+    let drawing = Drawing {
+        path,
+        interpreter,
+        page: options.page(),
+        part: Part::CropBox,
+        dpi: (size::DPI * options.across.max(1) as f64, size::DPI),
+        overprints: suspected.overprint,
+        has_ground: true,
+    };
+    let failed = |error| undrawn(path, error);
+    let mut drawer = Drawer::begin(&drawing).map_err(failed)?;
+    let Some(dots) = drawer.next_page().map_err(failed)? else {
+        return Err(wrong(path, no_page(&drawer.end().map_err(failed)?, options.page())));
+    };
+    let mut notes = Vec::new();
+    sized(path, dots, options, &mut notes)?;
+    let page = drawer.page(dots).map_err(failed)?;
+    if drawer.next_page().map_err(failed)?.is_some() {
+        return Ok(None);
+    }
+    let said = drawer.end().map_err(failed)?;
+    let mut art = page.at(&stem(path), dots, options);
+    art.notes.splice(..0, notes);
+    Ok(Some((art, said, interpreter)))
+}
+
+/// Refuses a page of so many dots that is too large to be read or printed.
+fn sized(
+    path: &Path,
+    (width, length): (usize, usize),
+    options: &Options,
+    notes: &mut Vec<String>,
+) -> Result<(), Diagnosis> {
+    let side = |dots| u32::try_from(dots).map_err(|_| wrong(path, "its page is too large"));
+    file::PICTURE.check(path, (side(width)?, side(length)?))?;
+    let across = options.across.max(1) as f64;
+    let unstated = Unstated::Drawing { rounded_mm: size::MM };
+    let pixels = (width as f64 / across, length as f64);
+    size::dots(path, pixels, Some((size::DPI, size::DPI)), unstated, options, notes).map(|_| ())
+}
+
+/// Why a document is not drawn.
+fn undrawn(path: &Path, error: DrawError) -> Diagnosis {
+    match error {
+        DrawError::Process(error) => draw::failed(path, error),
+        DrawError::Folder(source) => io(path, "make a folder for its pages")(source),
+        DrawError::Read(source) => io(path, "read its page")(source),
+    }
+}
+
 /// A document and how it is read.
 struct Document<'a> {
     path: &'a Path,
     interpreter: Interpreter,
     folder: &'a Scratch,
     options: &'a Options,
+    overprints: bool,
 }
 
 impl Document<'_> {
@@ -128,11 +235,14 @@ impl Document<'_> {
         let dpi = self.dpi(leaf, &mut notes)?;
         if !plates::layers(self.path, &self.path.display(), &leaf.spots, &mut notes)?.is_empty() {
             // The plates tell of the other spots themselves.
-            let mut art =
-                plates::separated_part((self.path, self.interpreter), leaf.number, Part::CropBox, dpi)?
-                    .whole(&name, self.options);
+            let source = (self.path, self.interpreter);
+            let separated =
+                plates::separated_part(source, leaf.number, Part::CropBox, (dpi, self.overprints))?;
+            let has_cuts = separated.has_cuts();
+            let mut art = separated.whole(&name, self.options);
             if art.layers.is_empty() && art.colour.is_none() {
-                return Err(nothing("no plate of the page has a dot"));
+                let nothing = nothing("no plate of the page has a dot");
+                return Err(if has_cuts { all_for_a_cutter(self.path) } else { nothing });
             }
             notes.retain(|note| !art.notes.contains(note));
             art.notes.append(&mut notes);
@@ -145,10 +255,17 @@ impl Document<'_> {
 
     /// What a page draws, with the kind of each pixel.
     fn drawn(&self, leaf: &Leaf, dpi: (f64, f64)) -> Result<Artwork, Diagnosis> {
-        let Tagged { size, pixels } =
-            draw::tagged((self.path, self.interpreter), leaf.number, Part::CropBox, dpi, self.folder)?;
-        let dots = (size.0 as usize, size.1 as usize);
-        Ok(picture::tagged_artwork(&stem(self.path), size, dots, pixels, self.options))
+        let drawing = Drawing {
+            path: self.path,
+            interpreter: self.interpreter,
+            page: Some(leaf.number),
+            part: Part::CropBox,
+            dpi,
+            overprints: self.overprints,
+            has_ground: true,
+        };
+        let (page, dots) = plates::drawn(self.path, &drawing)?;
+        Ok(page.at(&stem(self.path), dots, self.options))
     }
 
     /// One layer for each page, by the rules for pictures that are named after inks.
@@ -214,8 +331,9 @@ impl Document<'_> {
         Ok(Scan::of_page(self.path, picture.size, &rgba))
     }
 
-    /// The resolution at which a page has its final number of dots: that of the printer, as in a print queue, unless a size is set.
-    /// The program that draws rounds the sides of a page as the printer needs it.
+    /// The resolution at which a page has its final number of dots: that of the printer, as in a print
+    /// queue, unless a size is set. The program that draws rounds the sides of a page as the printer needs
+    /// it.
     fn dpi(&self, leaf: &Leaf, notes: &mut Vec<String>) -> Result<(f64, f64), Diagnosis> {
         let unstated = Unstated::Drawing { rounded_mm: leaf.rounded_mm };
         let dots = size::dots(self.path, leaf.size, Some((DRAFT, DRAFT)), unstated, self.options, notes)?;

@@ -207,7 +207,7 @@ fn meshes_and_hatches_are_named() {
 }
 
 /// A PDF of one page, 142 x 85 points or another size, with these spots (their names, and their process colours) and this drawing.
-pub(super) fn pdf(spots: &[(&str, &str)], drawing: &str, more: &str) -> Vec<u8> {
+pub(crate) fn pdf(spots: &[(&str, &str)], drawing: &str, more: &str) -> Vec<u8> {
     let space = |(at, (name, cmyk)): (usize, &(&str, &str))| {
         format!(
             "/S{at} [/Separation /{name} /DeviceCMYK << /FunctionType 2 /Domain [0 1] /C0 [0 0 0 0] /C1 [{cmyk}] /N 1 >>] "
@@ -240,28 +240,6 @@ pub(super) fn pdf(spots: &[(&str, &str)], drawing: &str, more: &str) -> Vec<u8> 
 const WHITE: (&str, &str) = ("White", ".1 0 0 0");
 
 #[test]
-fn colours_that_knock_out_white_are_told_and_white_can_be_kept() {
-    if !ghostscript() {
-        return;
-    }
-    let bench = Bench::new();
-    // White on 120 x 60 points, black and cyan on 40 x 30 and 30 x 30 of them. A point is 8.33 dots.
-    let drawing = "/S0 cs 1 scn 10 10 120 60 re f 0 0 0 1 k 30 20 40 30 re f 1 0 0 0 k 80 20 30 30 re f";
-    let file = bench.write("art.pdf", pdf(&[WHITE], drawing, ""));
-    let square = |points: f64| points * (600.0 / 72.0) * (600.0 / 72.0);
-    let art = read(std::slice::from_ref(&file), &Options::default());
-    let white = |art: &Artwork| inks(art).into_iter().find(|(ink, _)| *ink == Ink::White).unwrap().1;
-    assert!(near(art.knocked_out, square(1200.0 + 900.0), 0.015), "{}", art.knocked_out);
-    assert!(near(white(&art), square(7200.0 - 2100.0), 0.015));
-    let kept = read(&[file], &Options { keep_white: true, ..Options::default() });
-    assert!(near(white(&kept), square(7200.0), 0.015) && kept.knocked_out == 0);
-    // Art that overprints keeps it anyway.
-    let over = drawing.replace("0 0 0 1 k", "/G gs 0 0 0 1 k");
-    let over = pdf(&[WHITE], &over, "/ExtGState << /G << /OP true /op true /OPM 1 >> >>");
-    assert_eq!(read(&[bench.write("over.pdf", over)], &Options::default()).knocked_out, 0);
-}
-
-#[test]
 fn a_small_transparent_page_keeps_its_spot_plates() {
     if !ghostscript() {
         return;
@@ -284,7 +262,7 @@ fn registration_marks_are_printed_in_the_inks_of_the_page_only() {
     let art = |drawing: &str| {
         let file = bench.write("art.pdf", pdf(&[WHITE, ("All", "1 1 1 1")], drawing, ""));
         let art = read(&[file], &Options::default());
-        let mut found: Vec<Ink> = inks(&art).into_iter().map(|(ink, _)| ink).collect();
+        let mut found: Vec<Ink> = laid(&art).into_iter().map(|(ink, _)| ink).collect();
         found.sort_by_key(|ink| ink.name());
         (
             found,
@@ -293,7 +271,10 @@ fn registration_marks_are_printed_in_the_inks_of_the_page_only() {
     };
     let page = format!("/S0 cs 1 scn 20 20 100 40 re f 0 0 0 1 k 40 30 40 15 re f {marks}");
     assert_eq!(art(&page), (vec![Ink::Black, Ink::White], true));
-    assert_eq!(art(&page.replace("0 0 0 1 k", "1 0 0 1 k")), (vec![Ink::Black, Ink::Cyan, Ink::White], true));
+    assert_eq!(
+        art(&page.replace("0 0 0 1 k", "1 0 0 0 k 22 22 5 5 re f 0 0 0 1 k")),
+        (vec![Ink::Black, Ink::Cyan, Ink::White], true)
+    );
     assert_eq!(art(&page.replace(marks, "")), (vec![Ink::Black, Ink::White], false));
 }
 

@@ -22,6 +22,22 @@ pub struct Handling {
 }
 
 impl Handling {
+    /// Whether the sheet is film, through which the ground is seen: a transparency, or what is printed
+    /// without curl correction as decal film is.
+    #[must_use]
+    pub fn is_film(self) -> bool {
+        match self.media {
+            Media::Plain => !self.curl_correction,
+            Media::Transparency
+            | Media::TransparencyTwice
+            | Media::SpecialTransparency
+            | Media::SpecialTransparencyTwice
+            | Media::BackPrintFilm
+            | Media::BackPrintFilmTwice => true,
+            _ => false,
+        }
+    }
+
     /// A page of this paper in the printer's language.
     pub(crate) fn page(self, paper: Paper) -> Page {
         Page { media: self.media, curl_correction: self.curl_correction, ..Page::plain(paper) }

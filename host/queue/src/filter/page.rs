@@ -55,8 +55,8 @@ impl Press<'_> {
 
     /// How a page is read, drawn at so many pixels an inch.
     pub(super) fn options(&self, dpi: u16) -> art::Options {
-        let read = layers::Settings::of(self.choices, self.choices.paper, self.library).read;
-        art::Options { dpi: Some(dpi.into()), ..read }
+        let settings = layers::Settings::of(self.choices, self.choices.paper, self.library);
+        art::Options { dpi: Some(dpi.into()), ..settings.reading() }
     }
 
     /// Where a page is printed. `drawn` is the window around everything on it, none if it is blank. Notes why nothing is

@@ -36,8 +36,9 @@ use sheet::Size;
 /// What to read and how it becomes layers of ink.
 #[derive(ClapArgs, Debug)]
 pub struct LayersArgs {
-    /// Artwork: pictures named after their inks (white.png, 02-gold.png), a folder of them, a TIFF with named spot
-    /// channels, an SVG or OpenRaster file with named layers, a PDF or PostScript file, or one picture
+    /// Artwork: pictures named after their inks (white.png, 02-gold.png), a folder of them, a TIFF with
+    /// named spot channels, an SVG or OpenRaster file with named layers, a PDF or PostScript file, or one
+    /// picture
     #[arg(value_name = "ART", required = true)]
     pub art: Vec<PathBuf>,
     #[arg(long, help = SPOTS.help)]
@@ -46,17 +47,19 @@ pub struct LayersArgs {
     pub colour: Vec<(Ink, [u8; 3])>,
     #[arg(long, value_name = "STEPS", help = TOLERANCE.help, value_parser = whole(TOLERANCES))]
     pub tolerance: Option<u8>,
-    /// Resolution of the pictures in pixels per inch, if a file states none or a wrong one; of a drawing that states no size on
-    /// paper, its units per inch
+    /// Resolution of the pictures in pixels per inch, if a file states none or a wrong one; of a drawing
+    /// that states no size on paper, its units per inch
     #[arg(long, value_name = "DPI", value_parser = dpi)]
     pub dpi: Option<f64>,
     /// Page of a PDF, PostScript or TIFF file [default: the only page with art; several are an error]
     #[arg(long, value_name = "N", value_parser = page)]
     pub page: Option<u32>,
-    /// Read one page per ink from a PDF, PostScript or TIFF file: the ink of each page, such as white,gold,black
+    /// Read one page per ink from a PDF, PostScript or TIFF file: the ink of each page, such as
+    /// white,gold,black
     #[arg(long, value_name = "INKS", value_delimiter = ',', value_parser = names::typed, conflicts_with = "page")]
     pub pages: Vec<Ink>,
-    /// Layers that keep their tones, and are halftoned; other layers are solid where they are darker than half
+    /// Layers that keep their tones, and are halftoned; other layers are solid where they are darker than
+    /// half
     #[arg(long, value_name = "INKS")]
     pub tones: Option<String>,
     #[command(flatten)]
@@ -75,7 +78,8 @@ pub struct LayersArgs {
     /// Number of passes of an ink, such as white=3,primer=2 [default: 1 each]
     #[arg(long, value_name = "INK=N", value_delimiter = ',', value_parser = passes)]
     pub passes: Vec<(Ink, u8)>,
-    /// Inks that knock out the process inks beneath them, or none [default: metallic]
+    /// Inks that knock out the process inks beneath them, and the white that a page draws there; or none
+    /// [default: metallic]
     #[arg(long, value_name = "INKS")]
     pub knockout: Option<String>,
     #[arg(long, value_name = "MODE", help = WHITE.help, value_parser = of_page(&WHITE, |choices| choices.white))]
@@ -92,6 +96,7 @@ pub struct LayersArgs {
         long,
         value_name = "INTENT",
         help = INTENT.help,
+        long_help = INTENT.long_help(),
         value_parser = of_page(&INTENT, |choices| choices.intent),
         default_value = "auto"
     )]
@@ -101,8 +106,8 @@ pub struct LayersArgs {
     /// Suggestions of the plan to accept, separated by commas
     #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = choice::<Accept>())]
     pub accept: Vec<Accept>,
-    /// Your own ink library: its folder, or the name it was added under; its order rules and minimum clusters apply
-    /// [default: the built-in library]
+    /// Your own ink library: its folder, or the name it was added under; its order rules and minimum
+    /// clusters apply [default: the built-in library]
     #[arg(long, value_name = "LIBRARY")]
     pub library: Option<PathBuf>,
 }
@@ -228,7 +233,6 @@ impl LayersArgs {
             tones: self.tones.as_deref().map_or(Ok(InkSet::EMPTY), |text| set("--tones", text))?,
             inks: self.inks()?,
             cut_lines,
-            keep_white: self.accept.contains(&Accept::WhiteKept),
             ..art::Options::default()
         })
     }
@@ -298,19 +302,21 @@ pub struct Work {
     layers: LayersArgs,
     /// Size on paper, such as 120x90mm, 12cm or 5x4in
     ///
-    /// The artwork keeps its proportions. [default: the size stated in the files, else 600 dpi for layers and as large as the
-    /// page allows for a plain picture]
+    /// The artwork keeps its proportions. [default: the size stated in the files, else 600 dpi for layers
+    /// and as large as the page allows for a plain picture]
     #[arg(long)]
     size: Option<Size>,
-    /// Resolution of the print across the sheet: 600, or 1200 for art in cyan, magenta, yellow and black only
+    /// Resolution of the print across the sheet: 600, or 1200 for art in cyan, magenta, yellow and black
+    /// only
     ///
-    /// Along the sheet it is always 600 dpi. The printer prints every other ink wrong at 1200 dpi, so such a job is refused.
+    /// Along the sheet it is always 600 dpi. The printer prints every other ink wrong at 1200 dpi, so such
+    /// a job is refused.
     #[arg(long, value_name = "DPI", default_value = "600", value_parser = resolution)]
     resolution: Resolution,
     /// Write the lines for a cutter, with the registration marks, to this SVG in millimetres of the sheet
     ///
-    /// They are what the art has in a spot colour or layer named CutContour, KissCut, ThruCut, PerfCut, Crease, Dieline and the like.
-    /// Never printed, with this option or without.
+    /// They are what the art has in a spot colour or layer named CutContour, KissCut, ThruCut, PerfCut,
+    /// Crease, Dieline and the like. Never printed, with this option or without.
     #[arg(long, value_name = "FILE.svg")]
     cut_lines: Option<PathBuf>,
     #[command(flatten)]

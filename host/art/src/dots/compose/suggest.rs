@@ -8,6 +8,7 @@ use protocol::ink::{Ink, Kind};
 use protocol::rgl::Media;
 
 use super::separation::{COLOURS, InkLayer};
+use crate::artwork::Above;
 
 /// An ink is not worth a pass on fewer dots of a picture's colours than one in this many, for a pass takes
 /// minutes and ribbon over the whole length.
@@ -26,6 +27,36 @@ pub enum Accept {
     WhiteKept,
     /// Metallic silver beneath white.
     SilverUnderWhite,
+}
+
+impl Accept {
+    /// Its name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Accept::FoilUndercoat => "foil-undercoat",
+            Accept::EvenWhite => "even-white",
+            Accept::WhiteThrice => "white-thrice",
+            Accept::WhiteKept => "white-kept",
+            Accept::SilverUnderWhite => "silver-under-white",
+        }
+    }
+
+    /// Why it changes nothing, if it does not.
+    fn idle(self) -> &'static str {
+        match self {
+            Accept::FoilUndercoat => "no foil lies on anything else than the solid process inks",
+            Accept::EvenWhite => "no white lies directly on black",
+            Accept::WhiteThrice => "no white is printed in one pass",
+            Accept::WhiteKept => "no colours knock out white",
+            Accept::SilverUnderWhite => "no white lies on the bare sheet",
+        }
+    }
+
+    /// A note on an addition that was accepted and changes nothing.
+    pub(super) fn note(self) -> String {
+        format!("{} was accepted, but has no effect: {}", self.name(), self.idle())
+    }
 }
 
 /// The change of a setting that follows a suggestion.
@@ -113,9 +144,23 @@ pub(super) fn suggest(stacks: &[Stack], dots: &[u64], order: &[Ink]) -> Vec<Sugg
 }
 
 /// A suggestion on white that colours knock out, if they do.
-pub(super) fn knocked_out(dots: u64) -> Option<Suggestion> {
+pub(super) fn knocked_out(lost: &[(Above, u64)]) -> Option<Suggestion> {
     let text = "the colours knock out the white beneath them, as layout programs do unless they are told to overprint; keep the white";
-    (dots > 0).then(|| Suggestion { text: text.into(), remedy: Remedy::Accept(Accept::WhiteKept), dots })
+    let (_, dots) = *lost.iter().find(|(above, _)| *above == Above::Colours)?;
+    Some(Suggestion { text: text.into(), remedy: Remedy::Accept(Accept::WhiteKept), dots })
+}
+
+/// Notes on white that the art draws beneath other things.
+pub(super) fn white_beneath(kept: u64, lost: &[(Above, u64)]) -> impl Iterator<Item = String> {
+    let kept = (kept > 0).then(|| format!("white is kept on {kept} dots beneath what is drawn over it"));
+    let kinds = lost.iter().map(|(above, dots)| match above {
+        Above::Colours => format!("{dots} dots of colours"),
+        Above::Ink(ink) => format!("{dots} dots of {}", ink.name()),
+        Above::Paper => format!("{dots} dots of shapes as white as paper"),
+    });
+    let kinds: Vec<String> = kinds.collect();
+    let lost = (!kinds.is_empty()).then(|| format!("white makes room for {}", kinds.join(", ")));
+    kept.into_iter().chain(lost)
 }
 
 /// Suggestions to leave out inks that plain colour needs on so few dots that nobody would miss them.

@@ -1,14 +1,17 @@
 //! How Ghostscript converts the CMYK of text and drawings: as inks, so that K is black and C is cyan.
 //!
-//! Problem: its usual profile makes a brown black of K and a fifth of half a cyan. It can be told to convert without a
-//! profile, but in 10.05 and 10.08 its device with tags then writes cyan, magenta and yellow for red, green and blue. A profile that leads straight from
-//! CMYK to red, green and blue does so even where a transparency group is to be mixed in CMYK, and K becomes white there.
-//! Method: an ordinary profile of a printer is the one of all CMYK; pictures keep the usual one. Its inks take as much light as they cover, so a tint of
-//! one ink prints on as many dots as the page asks for. Red is what C and K leave of it, each by itself, and so on.
-//! What is red, green and blue in a group of CMYK becomes the colour's least ink over its K, `1 - max(R, G, B)`.
-//! Cost: 0.7 MB in a temporary file; 0.04 s of a document in CMYK. Limits: where an ink and K are just about full together, colours differ by up to
-//! 12 of 255, tints by 2. Source: ICC.1:2010, 8.3 and 10.10, with the header of version 2, for which black is black in every intent;
-//! Ghostscript's documentation of `DefaultCMYKProfile` and `SourceObjectICC`.
+//! Problem: its usual profile makes a brown black of K and a fifth of half a cyan. It can be told to
+//! convert without a profile, but in 10.05 and 10.08 its device with tags then writes cyan, magenta and
+//! yellow for red, green and blue. A profile that leads straight from CMYK to red, green and blue does so
+//! even where a transparency group is to be mixed in CMYK, and K becomes white there.
+//! Method: an ordinary profile of a printer is the one of all CMYK; pictures keep the usual one. Its inks
+//! take as much light as they cover, so a tint of one ink prints on as many dots as the page asks for. Red
+//! is what C and K leave of it, each by itself, and so on. What is red, green and blue in a group of CMYK
+//! becomes the colour's least ink over its K, `1 - max(R, G, B)`.
+//! Cost: 0.7 MB in a temporary file; 0.04 s of a document in CMYK. Limits: where an ink and K are just
+//! about full together, colours differ by up to 12 of 255, tints by 2. Source: ICC.1:2010, 8.3 and 10.10,
+//! with the header of version 2, for which black is black in every intent; Ghostscript's documentation of
+//! `DefaultCMYKProfile` and `SourceObjectICC`.
 
 use std::fs;
 use std::io;
@@ -26,11 +29,16 @@ const NODES_OF_LAB: usize = 33;
 /// Entries of a curve: one for each value of 8 bits, so that none lies between two.
 const ENTRIES: usize = 256;
 
-/// Ghostscript's options. Its process must run in the folder that has the files: it ends their names at a space.
+/// Ghostscript's options. Its process must run in the folder that has the files: it ends their names at a
+/// space.
 pub const OPTIONS: [&str; 2] = ["-sDefaultCMYKProfile=inks.icc", "-sSourceObjectICC=conversions"];
 
-/// The profile of pictures is Ghostscript's own; then relative intent, black point, no override of embedded profiles, no kept K: as it converts
-/// pictures by itself.
+/// Those of a document that overprints: what lies on each other is mixed as inks, in that profile, not in
+/// the usual one.
+pub const OVERPRINT: [&str; 2] = ["-dOverprint=/simulate", "-sBlendColorProfile=inks.icc"];
+
+/// The profile of pictures is Ghostscript's own; then relative intent, black point, no override of embedded
+/// profiles, no kept K: as it converts pictures by itself.
 const PICTURES: &str = "Image_CMYK default_cmyk.icc 1 1 0 0\n";
 
 /// Writes the files of [`OPTIONS`] into a folder.
@@ -72,7 +80,8 @@ fn nodes<const AXES: usize>(each: usize) -> impl Iterator<Item = [usize; AXES]> 
         .map(move |at| std::array::from_fn(|axis| at / each.pow((AXES - 1 - axis) as u32) % each))
 }
 
-/// What an ink on so much of the dots takes from the value of red, green or blue: it takes as much of their light.
+/// What an ink on so much of the dots takes from the value of red, green or blue: it takes as much of their
+/// light.
 pub(super) fn taken(ink: f64) -> f64 {
     1.0 - Srgb::<f64>::from_linear(LinSrgb::new(1.0 - ink, 0.0, 0.0)).red
 }

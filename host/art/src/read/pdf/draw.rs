@@ -5,19 +5,16 @@
 //! page; Ghostscript can read only the file (its safer mode).
 
 use std::collections::HashMap;
-use std::fs::File;
-use std::io::{BufReader, Read as _};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use super::complaint;
 use super::eps::{self, Bounds};
 use super::ghostscript::{self, Interpreter};
-use super::{complaint, conversion};
 use crate::error::{io, no_program, wrong};
 use crate::read::coverage::Scan;
 use crate::read::file;
 use crate::read::names::stem;
-use crate::read::object_type;
 use crate::read::process::{self, MOST_PAGES, Process, ProcessError};
 use files::scratch::Scratch;
 use files::shelf::Disk;
@@ -66,8 +63,8 @@ pub(super) struct Drafts {
 }
 
 /// The part of a page to draw.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Part {
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Part {
     /// The part that is meant to be seen: of a page in PDF its crop box, of an EPS file its bounding box.
     CropBox,
     /// The whole sheet.
@@ -85,7 +82,7 @@ pub(super) fn picture(
     folder: &Scratch,
 ) -> Result<PathBuf, Diagnosis> {
     let picture = folder.path().join("page.png");
-    let options = [one_page(page), crop(path, Part::CropBox)?].concat();
+    let options = [pages(page), cropped(path, Part::CropBox)?].concat();
     ghostscript((path, interpreter), &options, "pngalpha", dpi, &picture, || false)?;
     Ok(picture)
 }
@@ -114,52 +111,17 @@ pub(super) fn drafts(
     Ok((usual, Interpreter::Usual))
 }
 
-/// A page with the kind of each pixel ([`object_type`]).
-pub(super) struct Tagged {
-    /// Pixels across and down.
-    pub size: (u32, u32),
-    /// [`object_type::BYTES`] bytes a pixel.
-    pub pixels: Vec<u8>,
-}
-
-/// Draws a page with the kind of each pixel.
-///
-/// # Errors
-/// As [`drafts`], or too many pixels.
-pub(super) fn tagged(
-    (path, interpreter): (&Path, Interpreter),
-    page: u32,
-    part: Part,
-    dpi: (f64, f64),
-    folder: &Scratch,
-) -> Result<Tagged, Diagnosis> {
-    let picture = folder.path().join("page.pam");
-    conversion::write(folder.path()).map_err(io(path, "keep the conversion of its colours"))?;
-    let convert = conversion::OPTIONS.map(String::from).to_vec();
-    let options = [one_page(page), crop(path, part)?, convert].concat();
-    ghostscript((path, interpreter), &options, object_type::DEVICE, dpi, &picture, || false)?;
-    let damaged = || wrong(path, format!("page {page} cannot be drawn"));
-    let mut file = BufReader::new(File::open(&picture).map_err(|_| damaged())?);
-    let (width, height) = object_type::header(&mut file).ok().flatten().ok_or_else(damaged)?;
-    let side = |pixels: usize| u32::try_from(pixels).map_err(|_| damaged());
-    let size = (side(width)?, side(height)?);
-    file::PICTURE.check(path, size)?;
-    let mut pixels = vec![0; object_type::BYTES * width * height];
-    file.read_exact(&mut pixels).map_err(io(path, "read its page"))?;
-    let order = ghostscript::order(&pixels).map_err(|error| failed(path, error))?;
-    order.turn(&mut pixels);
-    Ok(Tagged { size, pixels })
-}
-
-fn one_page(page: u32) -> Vec<String> {
+/// The options for one page.
+pub(super) fn pages(page: u32) -> Vec<String> {
     vec![format!("-dFirstPage={page}"), format!("-dLastPage={page}")]
 }
 
-fn crop(path: &Path, part: Part) -> Result<Vec<String>, Diagnosis> {
+/// The options for a part of a page; what they run stands at their end.
+pub(super) fn crop(path: &Path, part: Part) -> std::io::Result<Vec<String>> {
     if part == Part::Sheet {
         return Ok(Vec::new());
     }
-    let cropped = match eps::bounds(path).map_err(io(path, "read it"))? {
+    let cropped = match eps::bounds(path)? {
         None => Vec::new(),
         Some(Bounds::InHeader) => vec!["-dEPSCrop".into()],
         // Ghostscript looks for it in the header alone.
@@ -172,6 +134,10 @@ fn crop(path: &Path, part: Part) -> Result<Vec<String>, Diagnosis> {
         ],
     };
     Ok([vec!["-dUseCropBox".into()], cropped].concat())
+}
+
+fn cropped(path: &Path, part: Part) -> Result<Vec<String>, Diagnosis> {
+    crop(path, part).map_err(io(path, "read it"))
 }
 
 fn leaves(
@@ -187,8 +153,8 @@ fn leaves(
     let to = if only.is_some() { place(1) } else { folder.path().join("draft%d.tif") };
     let options = [
         vec!["-sCompression=lzw".into(), SPOTS.into()],
-        only.map_or_else(Vec::new, one_page),
-        crop(path, part)?,
+        only.map_or_else(Vec::new, pages),
+        cropped(path, part)?,
     ]
     .concat();
     let options = [options, vec!["-c".into(), SAYS_SIZES.into()]].concat();
@@ -299,7 +265,7 @@ pub(super) fn separate(
     overprints: bool,
 ) -> Result<String, Diagnosis> {
     let mut options =
-        [one_page(page), crop(path, part)?, vec!["-dPrintSpotCMYK".into(), SPOTS.into()]].concat();
+        [pages(page), cropped(path, part)?, vec!["-dPrintSpotCMYK".into(), SPOTS.into()]].concat();
     if overprints {
         options.extend(["-c".into(), "true setoverprint".into()]);
     }
@@ -338,7 +304,7 @@ fn run(path: &Path, mut command: Command, progressed: impl FnMut() -> bool) -> R
 const NOT_FOUND: &str = "/undefinedfilename";
 
 /// Why a document cannot be drawn.
-fn failed(path: &Path, error: ProcessError) -> Diagnosis {
+pub(super) fn failed(path: &Path, error: ProcessError) -> Diagnosis {
     match error {
         ProcessError::Start(error) if error.kind() == std::io::ErrorKind::NotFound => {
             no_program(path, "Ghostscript", NO_GHOSTSCRIPT)

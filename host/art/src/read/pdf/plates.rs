@@ -1,19 +1,22 @@
 //! The plates of a page: spot colours that name inks, and the process plates.
 //!
-//! Problem: a spot colour may name an ink, or none; and one colour may be made of several spots (DeviceN), of which some
-//! name inks.
-//! Method: Ghostscript makes a plate of every spot. A spot that names a special ink is a layer of it. Every other spot is
-//! printed by its process colours: its plate is added to the process plates, in the shares that Ghostscript gives for its
-//! full tint. So a colour of several spots keeps each part. A name that resembles that of an ink is an error, because a
-//! slip would cost ribbon. The layers of art and the print queues use the same two functions, [`survey`] and [`separated`].
-//! If a process plate has tones, the page is drawn once more with the kind of each pixel, and what lies beside the layers is
-//! treated like any page: what drew a pixel decides how its colour is mixed. On dots of layers the process plates say what
-//! overprints. What is for a cutter is left out; marks that every plate has are printed on the plates that have more than these. Colours
-//! that are drawn over white knock it out unless the document says otherwise, which is the default of layout programs: a third run, in
-//! which all overprints, tells how many dots that are.
-//! Cost: seconds a page, twice if it has tones, once more if it has white and colours. Limits: where a spot overprints, tints between none
-//! and full are taken as
-//! proportional.
+//! Problem: a spot colour may name an ink, or none; and one colour may be made of several spots (DeviceN),
+//! of which some name inks.
+//! Method: Ghostscript makes a plate of every spot. A spot that names a special ink is a layer of it. Every
+//! other spot is printed by its process colours: its plate is added to the process plates, in the shares
+//! that Ghostscript gives for its full tint. So a colour of several spots keeps each part. A name that
+//! resembles that of an ink is an error, because a slip would cost ribbon. The layers of art and the print
+//! queues use the same two functions, [`survey`] and [`separated`]. If a process plate has a dot, the page
+//! is drawn once more with the kind of each pixel, and what lies beside the layers is the same as on any
+//! page. On dots of layers the process plates say what overprints. What is for a cutter is left out; marks
+//! that every plate has are printed on the plates that have more than these. Clear inks knock nothing out,
+//! whatever the document says: what lies beneath them is drawn again from a document in which they paint
+//! nothing ([`without`]). What is drawn over white knocks it out unless the document says otherwise, which
+//! is the default of layout programs: one more run, of a document in which all overprints
+//! ([`overprinting`]), tells where white would be ([`White`]).
+//! Cost: seconds a page, twice if it has colours, once more for clear ink, and for white. Limits: where a
+//! spot overprints, tints between none and full are taken as proportional; clear ink of a program in
+//! PostScript, and of an encrypted document, knocks out.
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -22,9 +25,12 @@ use protocol::ink::{Ink, Kind};
 use rayon::prelude::*;
 
 use super::conversion;
-use super::draw::{PROCESS, Part, Tagged, drafts, plates_beside, separate, tagged};
+use super::draw::{PROCESS, Part, drafts, plates_beside, separate};
+use super::drawer::{Drawer, Drawing};
 use super::ghostscript::Interpreter;
-use crate::artwork::Artwork;
+use super::objects::{self, overprinting, without};
+use super::{Suspected, undrawn};
+use crate::artwork::{Above, Artwork};
 use crate::error::{NamedPart, io, unknown_ink, wrong};
 use crate::options::Options;
 use crate::read::coverage::{Coverage, Scan};
@@ -32,6 +38,7 @@ use crate::read::cut_lines;
 use crate::read::file;
 use crate::read::names::{self, Named};
 use crate::read::object_type;
+use crate::read::page::Page;
 use crate::read::picture;
 use crate::read::size;
 use crate::window::Window;
@@ -52,8 +59,8 @@ enum Spot {
     Cut,
 }
 
-/// What becomes of a spot. One that names a process ink is printed by its process colours, like one that names no ink; of the latter
-/// there is a note, which begins with `place`.
+/// What becomes of a spot. One that names a process ink is printed by its process colours, like one that
+/// names no ink; of the latter there is a note, which begins with `place`.
 ///
 /// # Errors
 /// A name that resembles that of an ink.
@@ -95,7 +102,8 @@ pub(super) fn layers(
 
 /// What drafts tell of a whole document.
 pub struct Survey {
-    /// For each page the spot colours that are layers of ink and not blank. Empty for a document without pages.
+    /// For each page the spot colours that are layers of ink and not blank. Empty for a document without
+    /// pages.
     pub spots: Vec<Vec<String>>,
     /// The interpreter that draws most of it.
     pub interpreter: Interpreter,
@@ -128,12 +136,20 @@ pub struct Separated {
     rest: Option<Vec<u8>>,
     /// The plates for a cutter.
     cuts: Vec<Vec<u8>>,
-    /// The plate of white as it is if the colours do not knock it out, if they do.
-    knocked_out: Option<Vec<u8>>,
+    white: Option<White>,
     notes: Vec<String>,
 }
 
-/// Separates a page at `dpi` pixels per inch into plates for the spot colours of [`survey`] and the process plates.
+/// White beneath what is drawn over it and knocks it out.
+struct White {
+    /// Its plate as if nothing did.
+    whole: Vec<u8>,
+    /// What lies on the dots where that is more than the plate.
+    above: Vec<Option<Above>>,
+}
+
+/// Separates a page at `dpi` pixels per inch into plates for the spot colours of [`survey`] and the process
+/// plates.
 ///
 /// # Errors
 /// As [`open`](crate::open()).
@@ -144,33 +160,58 @@ pub fn separated(
     dpi: f64,
 ) -> Result<Separated, Diagnosis> {
     let page = u32::try_from(page).map_err(|_| wrong(path, format!("there is no page {page}")))?;
-    separated_part((path, interpreter), page, Part::Sheet, (dpi, dpi))
+    let overprints = Suspected::of(path).map_err(io(path, "read it"))?.overprint;
+    separated_part((path, interpreter), page, Part::Sheet, ((dpi, dpi), overprints))
+}
+
+/// The only page of a drawing, and its pixels across and down.
+pub(super) fn drawn(path: &Path, drawing: &Drawing<'_>) -> Result<(Page, (usize, usize)), Diagnosis> {
+    let failed = |error| undrawn(path, error);
+    let mut drawer = Drawer::begin(drawing).map_err(failed)?;
+    let none = || wrong(path, "its page cannot be drawn");
+    let size = drawer.next_page().map_err(failed)?.ok_or_else(none)?;
+    let side = |pixels| u32::try_from(pixels).map_err(|_| none());
+    file::PICTURE.check(path, (side(size.0)?, side(size.1)?))?;
+    let page = drawer.page(size).map_err(failed)?;
+    drawer.end().map_err(failed)?;
+    Ok((page, size))
 }
 
 pub(super) fn separated_part(
     (path, interpreter): (&Path, Interpreter),
     page: u32,
     part: Part,
-    dpi: (f64, f64),
+    (dpi, overprints): ((f64, f64), bool),
 ) -> Result<Separated, Diagnosis> {
+    let mut notes = Vec::new();
     let folder = Scratch::new().map_err(io(path, "make a folder for its plates"))?;
-    let full = folder.path().join("page.tif");
-    let said = separate((path, interpreter), page, part, dpi, &full, false)?;
-    let (width, height) = file::size(&full).ok_or_else(|| wrong(path, format!("there is no page {page}")))?;
-    let (mut plates, mut notes) = (Vec::new(), Vec::new());
-    let (mut process, mut others, mut cuts) = (Vec::new(), Vec::new(), Vec::new());
-    for (plate, plate_file) in plates_beside(&full, &folder)? {
-        let scan = Scan::of_picture(file::picture(&Disk, &plate_file, None)?);
-        if (scan.width, scan.height) != (width, height) {
-            return Err(wrong(path, format!("plate {plate} of page {page} differs in size from the page")));
-        }
+    let first = Plates::read(path, (path, interpreter), page, part, dpi, false)?;
+    let clear = |(plate, coverage): &&(String, Vec<u8>)| is_clear(plate) && coverage.iter().any(|&c| c > 0);
+    let clear: Vec<(String, Vec<u8>)> = first.all.iter().filter(clear).cloned().collect();
+    // From here on, what is drawn is the document without its clear inks.
+    let apart = match clear.is_empty() {
+        true => None,
+        false => changed(path, path, &folder, "apart.pdf", |object| without(object, is_clear))?,
+    };
+    let source = apart.as_deref().unwrap_or(path);
+    let Plates { said, size: (width, height), all: mut found } = match &apart {
+        Some(apart) => Plates::read(path, (apart, interpreter), page, part, dpi, false)?,
+        None => first,
+    };
+    if apart.is_some() {
+        found.retain(|(plate, _)| !is_clear(plate));
+        found.extend(clear);
+    }
+    let white = found.iter().find(|(plate, _)| is_white(plate)).map(|(plate, _)| plate.clone());
+    let (mut plates, mut process, mut others, mut cuts) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for (plate, coverage) in found {
         if PROCESS.contains(&plate.as_str()) {
-            process.push((plate, scan.coverage));
-        } else if scan.coverage.iter().any(|&c| c > 0) {
+            process.push((plate, coverage));
+        } else if coverage.iter().any(|&c| c > 0) || is_white(&plate) {
             match spot(path, &path.display(), &plate, &mut notes)? {
-                Spot::Layer(named) => plates.push((plate, named, scan.coverage)),
-                Spot::Process => others.push((plate, scan.coverage)),
-                Spot::Cut => cuts.push(scan.coverage),
+                Spot::Layer(named) => plates.push((plate, named, coverage)),
+                Spot::Process => others.push((plate, coverage)),
+                Spot::Cut => cuts.push(coverage),
             }
         }
     }
@@ -180,21 +221,24 @@ pub(super) fn separated_part(
     all.extend(others.iter_mut().map(|(_, coverage)| coverage));
     all.extend(&mut cuts);
     if unregistered(&mut all) {
-        plates.retain(|(.., coverage)| coverage.iter().any(|&c| c > 0));
         let place = path.display();
         notes.push(format!(
             "{place}: marks in the registration colour are printed in the inks that the page has anyway"
         ));
     }
-    let knocked_out = match plates.iter().find(|(_, named, _)| named.ink == Ink::White) {
-        Some((plate, _, white)) if process.iter().any(|(_, c)| c.iter().any(|&c| c > 0)) => {
-            let again = Scratch::new().map_err(io(path, "make a folder for its plates"))?;
-            let full = again.path().join("page.tif");
-            separate((path, interpreter), page, part, dpi, &full, true)?;
-            kept(plate, white, &process, &plates_beside(&full, &again)?)?
+    let white = match white {
+        Some(name) if all_above(&process, &plates).next().is_some() => {
+            let over = changed(path, source, &folder, "over.pdf", overprinting)?;
+            let over = over.as_deref().unwrap_or(source);
+            let again = Plates::read(path, (over, interpreter), page, part, dpi, true)?;
+            let whole = again.all.into_iter().find(|(plate, _)| *plate == name);
+            whole.and_then(|(_, whole)| White::new(whole, &process, &plates))
         }
         _ => None,
     };
+    plates.retain(|(_, named, coverage)| {
+        coverage.iter().any(|&c| c > 0) || named.ink == Ink::White && white.is_some()
+    });
     for (spot, coverage) in others {
         match full_tint(&said, &spot) {
             Some(tint) => add(&mut process, &coverage, tint),
@@ -204,29 +248,28 @@ pub(super) fn separated_part(
             )),
         }
     }
-    let toned = |coverage: &[u8]| coverage.par_iter().any(|&c| c != 0 && c != 255);
     let mut rest = None;
-    if process.iter().any(|(_, coverage)| toned(coverage)) {
-        let Tagged { size, mut pixels } = tagged((path, interpreter), page, part, dpi, &folder)?;
-        if size != (width, height) {
-            return Err(wrong(path, format!("page {page} differs in size from its plates")));
+    if process.iter().any(|(_, coverage)| coverage.par_iter().any(|&c| c > 0)) {
+        // Like that of a page without spots, so that a spot changes nothing elsewhere.
+        let page = Some(page);
+        let drawing = Drawing { path: source, interpreter, page, part, dpi, overprints, has_ground: false };
+        let (drawn, size) = drawn(path, &drawing)?;
+        if size != (width as usize, height as usize) {
+            return Err(wrong(path, "a page differs in size from its plates"));
         }
-        let own = plates.iter().map(|(.., coverage)| coverage).chain(&cuts);
+        let mut pixels = drawn.pixels();
+        // What is clear is not part of the picture.
+        let is_drawn = |(plate, ..): &&(String, Named, Vec<u8>)| apart.is_none() || !is_clear(plate);
+        let own = plates.iter().filter(is_drawn).map(|(.., coverage)| coverage).chain(&cuts);
         overprint(&mut pixels, &own.collect::<Vec<_>>(), &process);
         rest = Some(pixels);
-    } else {
-        for (plate, coverage) in process {
-            if let Some(named) = names::ink(&plate) {
-                plates.push((plate, named, coverage));
-            }
-        }
     }
     let size = (width as usize, height as usize);
-    Ok(Separated { size, dpi: dpi.0, plates, rest, cuts, knocked_out, notes })
+    Ok(Separated { size, dpi: dpi.0, plates, rest, cuts, white, notes })
 }
 
-/// Takes marks in the registration colour, which every plate has alike, off all plates that have nothing else. Whether there were any
-/// on such a plate. A page of nothing but marks keeps them.
+/// Takes marks in the registration colour, which every plate has alike, off all plates that have nothing
+/// else. Whether there were any on such a plate. A page of nothing but marks keeps them.
 fn unregistered(plates: &mut [&mut Vec<u8>]) -> bool {
     let Some(((first, others), count)) = plates.split_first().zip(plates.first().map(|plate| plate.len()))
     else {
@@ -250,31 +293,128 @@ fn unregistered(plates: &mut [&mut Vec<u8>]) -> bool {
     bare.contains(&true)
 }
 
-/// The white that lies beneath the colours if they do not knock it out; `None` if it is the same.
-fn kept(
-    plate: &str,
-    white: &[u8],
-    process: &[(String, Vec<u8>)],
-    again: &[(String, PathBuf)],
-) -> Result<Option<Vec<u8>>, Diagnosis> {
-    let Some((_, again)) = again.iter().find(|(name, _)| name == plate) else { return Ok(None) };
-    let mut whole = Scan::of_picture(file::picture(&Disk, again, None)?).coverage;
-    if whole.len() != white.len() {
-        return Ok(None);
-    }
-    let mut knocked = false;
-    for (at, (whole, &white)) in whole.iter_mut().zip(white).enumerate() {
-        let colour = process.iter().any(|(_, coverage)| coverage[at] > 0);
-        if *whole > white && colour {
-            knocked = true;
-        } else {
-            *whole = white;
-        }
-    }
-    Ok(knocked.then_some(whole))
+/// Whether a plate is of an ink that covers nothing.
+fn is_clear(plate: &str) -> bool {
+    !cut_lines::is_cut(plate)
+        && names::ink(plate).is_some_and(|named| matches!(named.ink.kind(), Kind::Finish | Kind::Primer))
 }
 
-/// Replaces what was drawn on the dots of layers, where it shows the layer, with what the process plates have there.
+fn is_white(plate: &str) -> bool {
+    !cut_lines::is_cut(plate) && names::ink(plate).is_some_and(|named| named.ink == Ink::White)
+}
+
+/// A document with other objects, as a file in `folder`; `None` if nothing is changed.
+fn changed(
+    path: &Path,
+    source: &Path,
+    folder: &Scratch,
+    name: &str,
+    change: impl Fn(&[u8]) -> Option<Vec<u8>>,
+) -> Result<Option<PathBuf>, Diagnosis> {
+    let bytes = objects::bytes(source).map_err(io(path, "read it"))?;
+    let Some(changed) = objects::changed(&bytes, change) else { return Ok(None) };
+    let to = folder.path().join(name);
+    std::fs::write(&to, changed).map_err(io(path, "keep a copy of it"))?;
+    Ok(Some(to))
+}
+
+/// The plates that Ghostscript makes of a page.
+struct Plates {
+    /// What it says of them.
+    said: String,
+    size: (u32, u32),
+    /// The name of each and its coverage, blank ones among them.
+    all: Vec<(String, Vec<u8>)>,
+}
+
+impl Plates {
+    /// Those of a page of `source`, which is `path` or made of it.
+    fn read(
+        path: &Path,
+        source: (&Path, Interpreter),
+        page: u32,
+        part: Part,
+        dpi: (f64, f64),
+        overprints: bool,
+    ) -> Result<Plates, Diagnosis> {
+        let folder = Scratch::new().map_err(io(path, "make a folder for its plates"))?;
+        let full = folder.path().join("page.tif");
+        let said = separate(source, page, part, dpi, &full, overprints)?;
+        let size = file::size(&full).ok_or_else(|| wrong(path, format!("there is no page {page}")))?;
+        let mut all = Vec::new();
+        for (plate, plate_file) in plates_beside(&full, &folder)? {
+            let scan = Scan::of_picture(file::picture(&Disk, &plate_file, None)?);
+            if (scan.width, scan.height) != size {
+                return Err(wrong(
+                    path,
+                    format!("plate {plate} of page {page} differs in size from the page"),
+                ));
+            }
+            all.push((plate, scan.coverage));
+        }
+        Ok(Plates { said, size, all })
+    }
+}
+
+/// The plates that may lie over white, with what each has on its dots.
+fn all_above<'a>(
+    process: &'a [(String, Vec<u8>)],
+    plates: &'a [(String, Named, Vec<u8>)],
+) -> impl Iterator<Item = (Above, &'a Vec<u8>)> {
+    let special = plates.iter().filter(|(plate, ..)| !is_white(plate) && !is_clear(plate));
+    let special = special.map(|(_, named, coverage)| (Above::Ink(named.ink), coverage));
+    let colours = process.iter().map(|(_, coverage)| (Above::Colours, coverage));
+    special.chain(colours).filter(|(_, coverage)| coverage.par_iter().any(|&c| c > 0))
+}
+
+impl White {
+    /// Of its plate as if nothing knocked it out; `None` if nothing does.
+    fn new(
+        whole: Vec<u8>,
+        process: &[(String, Vec<u8>)],
+        plates: &[(String, Named, Vec<u8>)],
+    ) -> Option<White> {
+        let (_, _, own) = plates.iter().find(|(plate, ..)| is_white(plate))?;
+        if whole.len() != own.len() {
+            return None;
+        }
+        let mut above = vec![None; whole.len()];
+        let lying: Vec<(Above, &Vec<u8>)> = all_above(process, plates).collect();
+        above.par_iter_mut().enumerate().filter(|(at, _)| whole[*at] > own[*at]).for_each(|(at, above)| {
+            let found = lying.iter().find(|(_, coverage)| coverage[at] > 0);
+            *above = Some(found.map_or(Above::Paper, |(above, _)| *above));
+        });
+        above.par_iter().any(Option::is_some).then_some(White { whole, above })
+    }
+
+    /// Adds the white to `coverage` that does not make room for what lies on it, and says of how many dots
+    /// that is so; the dots of the rest are counted by what lies on them.
+    fn kept(&self, coverage: &mut [u8], options: &Options) -> (u64, Vec<(Above, u64)>) {
+        let (mut kept, mut lost) = (0, Vec::<(Above, u64)>::new());
+        for ((coverage, &whole), above) in coverage.iter_mut().zip(&self.whole).zip(&self.above) {
+            let Some(above) = *above else { continue };
+            let is_kept = match above {
+                Above::Colours => options.keep_white,
+                Above::Ink(ink) => options.over_white.contains(ink),
+                Above::Paper => false,
+            };
+            if is_kept {
+                *coverage = whole;
+                kept += 1;
+            } else {
+                match lost.iter_mut().find(|(known, _)| *known == above) {
+                    Some((_, dots)) => *dots += 1,
+                    None => lost.push((above, 1)),
+                }
+            }
+        }
+        lost.sort_unstable();
+        (kept, lost)
+    }
+}
+
+/// Replaces what was drawn on the dots of layers, where it shows the layer, with what the process plates
+/// have there.
 fn overprint(pixels: &mut [u8], layers: &[&Vec<u8>], process: &[(String, Vec<u8>)]) {
     const ROWS: usize = 1 << 16;
     let of = |name: &str| process.iter().find(|(plate, _)| plate == name).map(|(_, coverage)| &coverage[..]);
@@ -294,8 +434,8 @@ fn overprint(pixels: &mut [u8], layers: &[&Vec<u8>], process: &[(String, Vec<u8>
     });
 }
 
-/// The process colours of a spot's full tint, as shares from 0 to 1 in the order of [`PROCESS`], from what Ghostscript says:
-/// `%%SeparationColor: "NAME" 100% ink = C M Y K CMYK`.
+/// The process colours of a spot's full tint, as shares from 0 to 1 in the order of [`PROCESS`], from what
+/// Ghostscript says: `%%SeparationColor: "NAME" 100% ink = C M Y K CMYK`.
 fn full_tint(said: &str, spot: &str) -> Option<[f64; 4]> {
     said.lines().find_map(|line| {
         let (name, rest) = line.strip_prefix("%%SeparationColor: \"")?.split_once("\" 100% ink = ")?;
@@ -323,6 +463,20 @@ fn add(process: &mut [(String, Vec<u8>)], coverage: &[u8], tint: [f64; 4]) {
 }
 
 impl Separated {
+    /// The names of the spot colours that are printed as inks of their own.
+    pub fn spots(&self) -> impl Iterator<Item = &str> {
+        let has_any = |(_, named, coverage): &&(String, Named, Vec<u8>)| {
+            named.ink.kind() != Kind::Process
+                && (coverage.iter().any(|&c| c > 0) || named.ink == Ink::White && self.white.is_some())
+        };
+        self.plates.iter().filter(has_any).map(|(plate, ..)| plate.as_str())
+    }
+
+    /// Whether anything is for a cutter.
+    pub(super) fn has_cuts(&self) -> bool {
+        !self.cuts.is_empty()
+    }
+
     /// The smallest rectangle around everything drawn, in pixels; `None` for a blank page.
     pub fn bounds(&self) -> Option<Window> {
         let plates = self.plates.iter();
@@ -361,13 +515,8 @@ impl Separated {
             colour.overprints = true;
         }
         for (plate, named, mut coverage) in self.plates {
-            if let (Ink::White, Some(whole)) = (named.ink, &self.knocked_out) {
-                let dots = whole.iter().zip(&coverage).filter(|(whole, own)| whole > own).count() as u64;
-                if options.keep_white {
-                    coverage.clone_from(whole);
-                } else {
-                    art.knocked_out = dots;
-                }
+            if let (Ink::White, Some(white)) = (named.ink, &self.white) {
+                (art.white_kept, art.knocked_out) = white.kept(&mut coverage, options);
             }
             let scan = Scan {
                 path: name.into(),
