@@ -6,6 +6,7 @@
 //! stacks already. Cost: that of the halftone; a page in black and white costs nothing. Limits: those of
 //! `fit`.
 
+pub(crate) mod bound;
 pub(crate) mod fit;
 pub(crate) mod intent;
 pub(crate) mod lattice;
@@ -228,11 +229,11 @@ impl Colour {
             _ => (false, true),
         };
         let wishes = Wishes { intent: how.intent, gamma: how.gamma, has_drawings, has_pictures };
-        let mut fit = Fit::new((&printable, &solids), space, &wishes, observer)?;
+        let mut fit = Fit::new((&printable, &solids), &space, &wishes)?;
         let rows = self.rows(dots, how.labels);
         if how.halftone == Method::Fine {
             let table = Table::for_cluster(largest_cluster(inks, library)?);
-            let index = screen::dots(rows, dots, &fit, &solids, table);
+            let index = screen::dots(rows, dots, (&fit, &solids), table, has_pictures);
             return Ok((fit.stacks, index));
         }
         let corners: Vec<[u8; 3]> =

@@ -1,12 +1,13 @@
-//! The lattice of colours that are fitted to the stacks, and the mixtures between its nodes.
+//! The lattice of colours for which mixtures of the stacks are found, and the mixtures between its nodes.
 //!
-//! Problem: a fit of eq. 1 takes 10 microseconds, a page has thirty million dots.
-//! Method: 17 x 17 x 17 colours are fitted, once for each intent in use. A pixel is interpolated among the four corners of the
+//! Problem: to find a mixture takes a microsecond, a page has thirty million dots.
+//! Method: 17 x 17 x 17 colours have theirs, once for each intent in use. A pixel is interpolated among the four corners of the
 //! tetrahedron around it. An interpolated mixture is a mixture, so every pixel is printable.
 //! Text and drawings name inks by the primaries of sRGB, none of which is printable as it looks. So that a tint does not differ
 //! from its solid in hue, the lines from white to the primaries, and between neighbouring primaries, are tints of those stacks. Other
-//! lattices run into these stacks at the primaries only ([`with_tints`]): colours that are nearly a primary print nearly as its solid.
-//! Cost: 60 ms for the fit, 20 ns a pixel. Limits: colours between nodes are as exact as the interpolation.
+//! lattices run into these stacks at the primaries only ([`with_tints`]). Both do so over so many nodes that no step of a ramp is
+//! seen, for a solid may lie 30 in CIEDE2000 from what is printed beside it.
+//! Cost: 60 ms for the nodes, 20 ns a pixel. Limits: colours between nodes are as exact as the interpolation.
 
 use inks::Stack;
 use maths::Maths;
@@ -16,21 +17,23 @@ use rayon::prelude::*;
 use crate::colour::intent::{Hull, Intent, Light};
 use crate::colour::tetrahedra::Even;
 use appearance::brdf::Space;
-use appearance::document::Materials;
 use appearance::gamut::{InkMix, Printable};
 use appearance::weights::{ONE, WeightError, WeightMaps, quantise};
 
-/// Nodes along an edge of the lattice: every 16th of 8 bits and the last, as ICC tables have, so that a solve
-/// of 4,913 colours is all a picture needs.
+/// Nodes along an edge of the lattice: every 16th of 8 bits and the last, as ICC tables have, so that
+/// 4,913 colours are all a picture needs.
 pub(crate) const NODES: usize = 17;
 /// Nodes of the lattice of one intent.
 pub(crate) const ALL: usize = NODES * NODES * NODES;
 
-/// The node below a value, and the distance of the value above it in 1/256 of the step between nodes.
-pub(crate) fn step(value: usize) -> (usize, u32) {
-    let at = value * (NODES - 1);
-    let node = (at / 255).min(NODES - 2);
-    (node, ((at - node * 255) * 256).div_euclid(255) as u32)
+/// The node below a value, and how far the value lies above it in 1/256 of the way between nodes, in the `light` of what is a part of
+/// full: mixtures add in light, so a colour that the inks reach is as exact between nodes as at them.
+pub(crate) fn step(value: usize, light: impl Fn(f64) -> f64) -> (usize, u32) {
+    let node = (value * (NODES - 1) / 255).min(NODES - 2);
+    let level = |node: usize| light(node as f64 / (NODES - 1) as f64);
+    let (low, high) = (level(node), level(node + 1));
+    let part = (light(value as f64 / 255.0) - low) / (high - low);
+    (node, (part * 256.0).round().clamp(0.0, 256.0) as u32)
 }
 
 /// The mixtures of the nodes, to interpolate between.
@@ -114,10 +117,12 @@ pub(crate) struct Near {
     pub edge: f64,
     /// For the lines from white, as a share of the distance from white.
     pub hue: f64,
+    /// In nodes from a solid, where nothing is a tint but what is near that.
+    pub corner: f64,
 }
 
 impl Near {
-    pub const USUAL: Near = Near { edge: 4.0, hue: 1.0 / 8.0 };
+    pub const USUAL: Near = Near { edge: 4.0, hue: 1.0 / 4.0, corner: 6.0 };
 }
 
 /// Up to so many nodes between its channels a colour is about grey: colours whose channels differ by less than a node lie between such
@@ -147,7 +152,7 @@ impl Tint {
         let along = towards([most, middle, least]);
         let (dark, pale) = ((NODES - 1) as f64 - most, least);
         let off_line = along.min(1.0 - along) / near.hue;
-        let part = (1.0 - dark / near.edge).max(0.0) * (1.0 - off_line.min(pale / near.edge)).max(0.0);
+        let part = level(1.0 - dark / near.edge) * (1.0 - off_line.min(pale / near.edge)).max(0.0);
         let amount = [most, middle, least].map(|level| amount(level / (NODES - 1) as f64));
         let (paper, second) = (amount[2] / amount[0], towards(amount));
         let (primary, secondary) = (order[0].1, order[0].1 | order[1].1);
@@ -155,14 +160,26 @@ impl Tint {
         Some(Tint { parts: [(7, paper), (secondary, ink * second), (primary, ink * (1.0 - second))], part })
     }
 
-    /// The solid of a primary, at its own node only: what lies between it and the next nodes runs into it.
-    pub fn of_corner(node: [usize; 3]) -> Option<Tint> {
+    /// The solid of a primary at its own node, and in part at those near it.
+    pub fn of_corner(node: [usize; 3], near: Near) -> Option<Tint> {
         let last = NODES - 1;
-        let corner = node.iter().fold(0, |bits, &level| 2 * bits + usize::from(level == last));
+        let (mut corner, mut off) = (0, 0);
+        for level in node {
+            let is_far = 2 * level > last;
+            corner = 2 * corner + usize::from(is_far);
+            off = off.max(if is_far { last - level } else { level });
+        }
+        let part = level(1.0 - off as f64 / near.corner);
         // White and black are fitted, as all greys are.
-        let is_primary = (1..7).contains(&corner) && node.iter().all(|&level| level == 0 || level == last);
-        is_primary.then_some(Tint { parts: [(corner, 1.0), (7, 0.0), (7, 0.0)], part: 1.0 })
+        let is_primary = (1..7).contains(&corner);
+        is_primary.then_some(Tint { parts: [(corner, 1.0), (7, 0.0), (7, 0.0)], part })
     }
+}
+
+/// A part that begins and ends level: what is beside a dark solid is much lighter soon.
+fn level(part: f64) -> f64 {
+    let part = part.max(0.0);
+    part * part * (3.0 - 2.0 * part)
 }
 
 /// Prints the edges of a lattice on which no fit is wanted: from white to each of the six primaries and from cyan, magenta and
@@ -249,14 +266,13 @@ impl Wider {
     }
 }
 
-/// The lattices as a document: one matte pixel for every node, in order of intent, red, green and blue.
+/// The colours of the nodes, in order of intent, red, green and blue.
 pub(crate) struct Lattice {
-    space: Space,
-    pub paper: Vec<f64>,
-    black: Vec<f64>,
     /// What each stack looks like and what is printed for each node, between black and paper.
     stacks: Vec<Light>,
     light: Vec<Light>,
+    /// The numbers of black and of paper.
+    ends: (usize, usize),
 }
 
 /// Paper's number among the stacks, and that of the stack that prints black. Black ink is preferred: text in three inks is never
@@ -274,10 +290,9 @@ pub(crate) fn ends(printable: &Printable, space: &Space) -> (usize, usize) {
 
 impl Lattice {
     /// The lattices of these intents. Values are brightened by the exponent 1 / `gamma` first.
-    pub fn new(space: Space, printable: &Printable, intents: &[Intent], gamma: f64) -> Lattice {
-        let (bare, black) = ends(printable, &space);
-        let paper = printable.curves.row(bare).to_vec();
-        let black = printable.curves.row(black).to_vec();
+    pub fn new(space: &Space, printable: &Printable, intents: &[Intent], gamma: f64) -> Lattice {
+        let (bare, dark) = ends(printable, space);
+        let [paper, black] = [bare, dark].map(|end| printable.curves.row(end));
         // The raking end of the curves: the body's colour without the surface's gloss.
         let body = |row: &[f64]| -> Light {
             let from = row.len() - 3;
@@ -302,46 +317,27 @@ impl Lattice {
             nodes
         });
         let light = light.collect();
-        Lattice { space, paper, black, stacks, light }
+        Lattice { stacks, light, ends: (dark, bare) }
     }
 
-    /// Makes the mixtures of the lattice number `lattice` those that are most even in lightness, of the stacks of `printable`. What is about grey stays as it is:
-    /// black and paper, whose hue no error of the printer changes.
-    pub fn even(&self, mix: InkMix, lattice: usize, printable: &Printable) -> Result<InkMix, WeightError> {
-        let even = Even::new(&self.stacks);
-        let mut wider = Wider::new(mix);
-        let channels: Vec<usize> = printable.stacks.iter().map(|stack| wider.channel(stack)).collect();
-        wider.changed(|node, out| {
-            let Some(node) = node.checked_sub(lattice * ALL).filter(|&node| node < ALL) else { return };
-            let [r, g, b] = [node / (NODES * NODES), node / NODES % NODES, node % NODES];
+    /// The mixtures of all nodes, of the stacks of `printable`.
+    pub fn mixtures(&self, printable: &Printable) -> Result<InkMix, WeightError> {
+        let even = Even::new(&self.stacks, self.ends);
+        let stacks = printable.stacks.clone();
+        let n = stacks.len();
+        let mut data = vec![0; n * self.light.len()];
+        data.par_chunks_exact_mut(n).zip(&self.light).enumerate().for_each(|(node, (out, &light))| {
+            let [r, g, b] = [node / (NODES * NODES) % NODES, node / NODES % NODES, node % NODES];
             let is_grey = r.max(g).max(b) - r.min(g).min(b) <= GREY;
-            let shares = even.shares(self.light[lattice * ALL + node]).filter(|_| !is_grey);
-            if let Some(shares) = shares {
-                out.fill(0.0);
-                shares.into_iter().for_each(|(stack, share)| out[channels[stack]] += share);
+            let mut wanted = vec![0.0; n];
+            for (stack, share) in if is_grey { even.about_grey(light) } else { even.shares(light) } {
+                wanted[stack] += share * f64::from(ONE);
             }
-        })
-    }
-}
-
-impl Materials for Lattice {
-    fn width(&self) -> usize {
-        NODES * NODES
-    }
-
-    fn height(&self) -> usize {
-        self.light.len() / (NODES * NODES)
-    }
-
-    fn space(&self) -> &Space {
-        &self.space
-    }
-
-    fn reflectance(&self, pixel: usize, out: &mut [f32]) {
-        let light = self.light[pixel];
-        for (at, out) in out.iter_mut().enumerate() {
-            *out = (self.black[at] + light[at % 3] * (self.paper[at] - self.black[at])).max(0.0) as f32;
-        }
+            quantise(&wanted, out);
+        });
+        let maps = WeightMaps::new(NODES * NODES, self.light.len() / (NODES * NODES), n, data)?;
+        let matrix = (0..n).map(|q| (0..n).map(|p| if p == q { ONE } else { 0 }).collect()).collect();
+        Ok(InkMix { stacks, maps, matrix })
     }
 }
 
@@ -362,7 +358,7 @@ mod tests {
                 quantise(&weights, out);
             }
             let maps = WeightMaps::new(NODES * NODES, 2 * NODES, channels, data).unwrap();
-            let (nodes, at) = (Nodes::new(&maps), pixel.map(|v| step(usize::from(v))));
+            let (nodes, at) = (Nodes::new(&maps), pixel.map(|v| step(usize::from(v), |v| v)));
             let (mut sums, mut out) = (nodes.scratch(), vec![0; channels]);
             nodes.between(lattice, at, &mut sums, &mut out);
             prop_assert_eq!(out.iter().map(|&w| u32::from(w)).sum::<u32>(), u32::from(ONE));
@@ -384,7 +380,7 @@ mod tests {
 
         #[test]
         fn a_value_lies_between_its_nodes(value in 0usize..256) {
-            let (node, part) = step(value);
+            let (node, part) = step(value, |v| v);
             let at = (node as f64 + f64::from(part) / 256.0) / (NODES - 1) as f64;
             prop_assert!((at - value as f64 / 255.0).abs() < 1.0 / 4000.0);
         }
@@ -396,7 +392,7 @@ mod tests {
         fn colours_that_differ_by_less_than_a_node_lie_between_nodes_about_grey(
             base in 0u8..=255, off in prop::array::uniform3(0u8..=15)
         ) {
-            let at = off.map(|off| step(usize::from(base.saturating_add(off))));
+            let at = off.map(|off| step(usize::from(base.saturating_add(off)), |v| v));
             let mut axes = [0, 1, 2];
             axes.sort_by_key(|&axis| std::cmp::Reverse(at[axis].1));
             let mut node = at.map(|(node, _)| node);

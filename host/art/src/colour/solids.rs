@@ -56,6 +56,12 @@ impl Solids<'_> {
         }
     }
 
+    /// What a stack reflects between black and paper, as the colours of art are: 0 and 1.
+    pub(crate) fn light(&self, stack: &Stack) -> Light {
+        let (own, black) = (self.body(stack), self.relative(self.black));
+        std::array::from_fn(|c| (own[c] - black[c]) / (1.0 - black[c]))
+    }
+
     /// The stack that looks most like a colour, if it is at most [`NEAR`] from it; never bare paper.
     pub(crate) fn nearest(&self, colour: [u8; 3]) -> Option<&Stack> {
         let black = self.relative(self.black);

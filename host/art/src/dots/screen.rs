@@ -1,18 +1,26 @@
 //! Dots of colours, each by itself: a table of small clusters picks its stack.
 //!
-//! Problem: letters, lines and photographs in process inks must each have the colours that were asked for, as an eye sees them
-//! at reading distance, and nothing drawn elsewhere may change a dot.
-//! Method: a dot asks only for its own colour, whose mixture (`mixtures`) lies on [0, 1) with the stacks in order of lightness; the
-//! threshold of the green noise at the dot ([`Table`]) picks one. A colour that is a stack is that stack. A dot is flat if [`ALIKE`] of its
-//! eight neighbours have its very colour; at edges between flat dots the mixture leans towards the edge (`lean`).
-//! Strips of rows are made independently of each other; each reads [`HALO`] rows beyond itself.
-//! Blocks of one colour are found first, since most of a page is paper.
-//! Cost: some 20 ns a dot of a photograph, 1 ns of a page of text. Memory: a byte a dot, and a strip for each thread.
+//! Problem: letters, lines and photographs in process inks must each have the colours that were asked for,
+//! as an eye sees them at reading distance, and nothing drawn elsewhere may change a dot.
+//! Method: a dot asks only for its own colour, whose mixture (`mixtures`) lies on [0, 1) with the stacks in
+//! order of lightness; the threshold of the green noise at the dot ([`Table`]) picks one. A colour that is
+//! a stack is that stack. A dot is flat if [`ALIKE`] of its eight neighbours have its very colour; at edges
+//! between flat dots the mixture leans towards the edge (`lean`). The dots of pictures also know what those
+//! before them printed (`diffusion`). Strips of rows are made independently of each other; each reads
+//! [`HALO`] rows beyond itself. Blocks of one colour are found first, since most of a page is paper.
+//! Cost: some 30 ns a dot of a photograph, 1 ns of a page of text. Memory: a byte a dot, and a strip for
+//! each thread.
 //! Limits: process inks, and colours of 8 bits.
-//! Source: `green_noise` of the halftone for the table; three examinations by a model of the eye for the rest (docs/decisions/flat-art.md).
+//! Source: `green_noise` of the halftone for the table; three examinations by a model of the eye for the
+//! rest (docs/decisions/flat-art.md).
 
 #[cfg(test)]
+mod carried;
+#[cfg(test)]
+mod colours;
+#[cfg(test)]
 mod constants;
+mod diffusion;
 #[cfg(test)]
 mod figures;
 mod lean;
@@ -30,14 +38,17 @@ use crate::colour::fit::Fit;
 use crate::colour::packed::{DRAWN, Key, LABEL, colour};
 use crate::colour::solids::Solids;
 use appearance::wide::wide;
+use diffusion::{Diffusion, EARLY};
 use halftone::green_noise::{SIDE, Table};
 use lean::{AREA, FLAT, Leans};
 use mixtures::{Mixtures, Stops};
 
-/// Rows of a strip.
+/// Rows of a strip. Source: some for every thread on the smallest sheet.
 const STRIP: usize = 64;
-/// Rows beyond a strip that decide about its dots: those of the dots whose flatness says whether there is an edge beside the
-/// partner of a dot.
+/// Rows of a strip that begins early. Source: the rows that are looked at twice are a sixteenth of it.
+const STRIP_OF_PICTURES: usize = 256;
+/// Rows beyond a strip that decide about its dots: those of the dots whose flatness says whether there is
+/// an edge beside the partner of a dot.
 const HALO: usize = 4;
 /// Neighbours of its very colour that make a dot flat: a line of one dot has two.
 const ALIKE: u8 = 2;
@@ -46,46 +57,51 @@ const ALL: u8 = 8;
 /// Dots that are looked at together, a part of [`SIDE`].
 const BLOCK: usize = 32;
 
-/// The number of the stack of every dot. `rows` writes the colours of rows of dots.
+/// The number of the stack of every dot. `rows` writes the colours of rows of dots, among which may be
+/// those of `pictures`.
 pub(crate) fn dots(
     rows: impl Fn(Range<usize>, &mut [Key]) + Sync,
     (width, height): (usize, usize),
-    fit: &Fit,
-    solids: &Solids<'_>,
+    (fit, solids): (&Fit, &Solids<'_>),
     table: &Table,
+    pictures: bool,
 ) -> Vec<u8> {
+    let strip = if pictures { STRIP_OF_PICTURES } else { STRIP };
     // Sixteen are the stacks of four inks in one order.
     match fit.stacks.len() {
-        ..=16 => strips::<16>(&rows, (width, height), STRIP, &Mixtures::new(fit, solids), table),
-        _ => strips::<256>(&rows, (width, height), STRIP, &Mixtures::new(fit, solids), table),
+        ..=16 => strips::<16>(&rows, (width, height), (strip, pictures), &Mixtures::new(fit, solids), table),
+        _ => strips::<256>(&rows, (width, height), (strip, pictures), &Mixtures::new(fit, solids), table),
     }
 }
 
 fn strips<const N: usize>(
     rows: &(impl Fn(Range<usize>, &mut [Key]) + Sync),
     (width, height): (usize, usize),
-    strip: usize,
+    (strip, pictures): (usize, bool),
     mixtures: &Mixtures<'_, N>,
     table: &Table,
 ) -> Vec<u8> {
+    let early = if pictures { EARLY } else { 0 };
     let mut index = vec![0; width * height];
     index.par_chunks_mut(width * strip).enumerate().for_each_init(Strip::default, |read, (number, out)| {
         let top = number * strip;
-        read.read(rows, (width, height), top..top + out.len() / width);
+        read.read(rows, (width, height), (top.min(early), top..top + out.len() / width));
         wide(
             #[inline(always)]
-            || read.pick(mixtures, table, out),
+            || read.pick(mixtures, pictures, table, out),
         );
     });
     index
 }
 
-/// The dots of a strip and those beyond it that decide about them. It is read anew for the next, so that its memory is not fresh each time.
+/// The dots of a strip and those beyond it that decide about them. It is read anew for the next, so that
+/// its memory is not fresh each time.
 #[derive(Default)]
 struct Strip {
     width: usize,
-    /// The strip's own rows among those read.
+    /// The strip's own rows among those read, and how many before them are looked at.
     own: Range<usize>,
+    early: usize,
     /// The strip's first row on the page.
     top: usize,
     /// The colours of the dots, row by row, and these with [`FLAT`].
@@ -100,11 +116,11 @@ impl Strip {
         &mut self,
         read: &impl Fn(Range<usize>, &mut [Key]),
         (width, height): (usize, usize),
-        rows: Range<usize>,
+        (early, rows): (usize, Range<usize>),
     ) {
-        let all = rows.start.saturating_sub(HALO)..(rows.end + HALO).min(height);
+        let all = rows.start.saturating_sub(early + HALO)..(rows.end + HALO).min(height);
         let Strip { plain, keys, even, .. } = self;
-        (self.width, self.top) = (width, rows.start);
+        (self.width, self.top, self.early) = (width, rows.start, early);
         self.own = rows.start - all.start..rows.end - all.start;
         plain.resize(width * all.len(), 0);
         read(all, plain);
@@ -132,7 +148,8 @@ impl Strip {
                         mark(width - 1..width, ALL - 3);
                         continue;
                     }
-                    // Beyond the page there is nothing, so a border has its own colour outside only where it goes on.
+                    // Beyond the page there is nothing, so a border has its own colour outside only where
+                    // it goes on.
                     let around = [(y > 0).then(|| row(y - 1)), Some(row(y)), (y < last).then(|| row(y + 1))];
                     mark_flat(out, around);
                 }
@@ -141,15 +158,34 @@ impl Strip {
     }
 
     #[inline(always)]
-    fn pick<const N: usize>(&self, mixtures: &Mixtures<'_, N>, table: &Table, out: &mut [u8]) {
+    fn pick<const N: usize>(
+        &self,
+        mixtures: &Mixtures<'_, N>,
+        pictures: bool,
+        table: &Table,
+        out: &mut [u8],
+    ) {
         let mut leans = Leans::new(&self.keys, &self.even, mixtures.rules.apart);
         let mut known = Known::new(mixtures);
+        let mut diffusion = pictures.then(|| Diffusion::new(self.width, mixtures.rules));
+        let row = |y: usize| &self.keys[y * self.width..(y + 1) * self.width];
+        if let Some(diffusion) = &mut diffusion {
+            for before in (1..=self.early).rev() {
+                let y = self.top - before;
+                diffusion.row(y, row(self.own.start - before), &mut known, table.row(y), None);
+            }
+        }
+        let is_carrying =
+            |key: Key| pictures && diffusion::is_carrying(key, |colour| mixtures.is_named(colour));
         for (y, out) in self.own.clone().zip(out.chunks_exact_mut(self.width)) {
             let thresholds = table.row(self.top + y - self.own.start);
-            let keys = &self.keys[y * self.width..(y + 1) * self.width];
+            let keys = row(y);
             if self.even[y].is_some_and(|key| mixtures.is_named(colour(key))) {
                 let stops = known.stops(keys[0]);
                 out.fill(mixtures.order[Mixtures::pick(&stops, 0)]);
+                if let Some(diffusion) = &mut diffusion {
+                    diffusion.rest();
+                }
                 continue;
             }
             let mut at = (Key::MAX, [0; N]);
@@ -164,13 +200,22 @@ impl Strip {
                     continue;
                 }
                 for ((&key, &threshold), out) in keys.iter().zip(thresholds).zip(out) {
+                    if is_carrying(key) {
+                        continue;
+                    }
                     if key != at.0 {
                         at = (key, known.stops(key));
                     }
                     *out = mixtures.order[Mixtures::pick(&at.1, threshold)];
                 }
             }
+            if let Some(diffusion) = &mut diffusion {
+                diffusion.row(self.top + y - self.own.start, keys, &mut known, thresholds, Some(&mut *out));
+            }
             for lean in leans.row(y, |key| mixtures.is_named(colour(key))) {
+                if is_carrying(keys[lean.x]) {
+                    continue;
+                }
                 let stops = known.leaning(lean);
                 out[lean.x] = mixtures.order[Mixtures::pick(&stops, thresholds[lean.x % SIDE])];
             }
@@ -185,7 +230,8 @@ fn marked(key: Key, alike: u8) -> Key {
     key | flat | if alike == ALL && key & DRAWN == 0 { AREA } else { 0 }
 }
 
-/// Marks the flat ones among the dots of a row. `around` are the rows above, of these dots and below, without marks.
+/// Marks the flat ones among the dots of a row. `around` are the rows above, of these dots and below,
+/// without marks.
 #[inline(always)]
 fn mark_flat(out: &mut [Key], around: [Option<&[Key]>; 3]) {
     let width = out.len();
@@ -246,13 +292,10 @@ impl<'a, const N: usize> Known<'a, N> {
 
     #[inline(always)]
     fn stops(&mut self, key: Key) -> Stops<N> {
-        let drawn = key & DRAWN > 0;
-        // The step of a shading in a picture is no colour of its own.
-        let is_flat = key & if drawn { FLAT } else { AREA } > 0;
-        // A photograph's colours hardly ever return.
-        match is_flat || key & LABEL > 0 {
-            true => self.kept(key),
-            false => self.mixtures.stops(colour(key), drawn),
+        // A photograph's colours hardly ever return, and the step of a shading in it is no colour of its own.
+        match key & (DRAWN | AREA | LABEL) > 0 {
+            true => self.kept(key & !(FLAT | AREA)),
+            false => self.mixtures.stops(colour(key), false),
         }
     }
 

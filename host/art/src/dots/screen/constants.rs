@@ -24,8 +24,8 @@ proptest! {
         let rows = |rows: Range<usize>, out: &mut [Key]| out.copy_from_slice(&plain[width * rows.start..width * rows.end]);
         let mut strip = Strip::default();
         // What was read before does not matter.
-        strip.read(&rows, (width, height), 0..height.div_ceil(2));
-        strip.read(&rows, (width, height), 0..height);
+        strip.read(&rows, (width, height), (0, 0..height.div_ceil(2)));
+        strip.read(&rows, (width, height), (0, 0..height));
         for at in 0..width * height {
             let (x, y) = (at % width, at / width);
             let near = (y.saturating_sub(1)..(y + 2).min(height)).flat_map(|v| (x.saturating_sub(1)..(x + 2).min(width)).map(move |u| (u, v)));
@@ -62,7 +62,8 @@ fn by(rules: edges::Rules, art: &Art, coarse: usize) -> Vec<u8> {
     let pixel = |x: usize, y: usize| key(soft.rgb[y * soft.width + x], false);
     let edges = Edges::by(rules, pixel, (soft.width, soft.height), (ART, ART));
     let (fit, solids) = &*INKS;
-    dots(|rows, out: &mut [Key]| edges.read(rows, out), (ART, ART), fit, solids, Table::for_cluster(USUAL))
+    let table = Table::for_cluster(USUAL);
+    dots(|rows, out: &mut [Key]| edges.read(rows, out), (ART, ART), (fit, solids), table, false)
 }
 
 /// As many dots of soft black text are wrong as by the usual rules, or about so.
@@ -88,7 +89,7 @@ fn a_fifth_of_a_rule_hardly_matters_to_soft_text() {
 /// An eye sees the same by rules of which one is a fifth less or more.
 #[test]
 fn a_fifth_of_a_rule_of_mixtures_hardly_changes_what_an_eye_sees() {
-    let Rules { least, apart, part } = Rules::USUAL;
+    let Rules { least, apart, part, .. } = Rules::USUAL;
     let usual = Rules::USUAL;
     let moved = [4, 6].map(|fifths| {
         [
@@ -99,14 +100,14 @@ fn a_fifth_of_a_rule_of_mixtures_hardly_changes_what_an_eye_sees() {
     });
     let art = [
         ("grey text", text(&SIZES, GREY, [255; 3]), 1.0),
-        ("navy text on a tint", text(&SIZES, [26, 79, 139], [225, 235, 245]), 2.5),
+        ("navy text on a tint", text(&SIZES, [26, 79, 139], [225, 235, 245]), 2.9),
         ("map", map(), 1.5),
     ];
     for (name, art, most) in art {
         let before = figure_by(usual, &art, ObjectType::Drawing, 1);
         for rules in moved.as_flattened() {
             let found = figure_by(*rules, &art, ObjectType::Drawing, 1);
-            let Rules { least, apart, part } = rules;
+            let Rules { least, apart, part, .. } = rules;
             println!("{name}, {least} {apart} {part}: {found:.3}, not {before:.3}");
             assert!(
                 found <= most && (found - before).abs() < 0.15,

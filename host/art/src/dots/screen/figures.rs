@@ -1,17 +1,21 @@
-//! How far dots differ from the art, as an eye sees both from reading distance: the figures of docs/decisions/flat-art.md.
+//! How far dots differ from the art, as an eye sees both from reading distance: the figures of
+//! docs/decisions/flat-art.md.
 //!
-//! Method: letters, lines and tints are drawn here. What is asked is the mixture of each colour, as light; what is printed is the light of the
-//! stacks. Both are filtered as an eye does ([`seen`]), and their mean difference over the picture is the figure.
-//! Limits: dots are squares without gain. Source: X. Zhang, B. Wandell, A spatial extension of CIELAB for digital color image reproduction
-//! (1997): weights and spreads of the filters in degrees, each normalised to a sum of 1.
+//! Method: letters, lines and tints are drawn here. What is asked is the drawn colour, or the nearest of
+//! its hue that the stacks reach ([`Reach`]), as light between black and paper; what is printed is the
+//! light of the stacks. Both are filtered as an eye does ([`seen`]), and their mean difference over the
+//! picture is the figure. No mixture of the code under test has a part in what is asked.
+//! Limits: dots are squares without gain. Source: X. Zhang, B. Wandell, A spatial extension of CIELAB for
+//! digital color image reproduction (1997): weights and spreads of the filters in degrees, each normalised
+//! to a sum of 1.
 
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
-use super::mixtures::{Rules, shares};
+use super::mixtures::Rules;
 use super::tests::{Art, INKS, stack};
 use super::*;
-use crate::colour::intent::Light;
+use crate::colour::intent::{Light, oklab};
 use crate::read::object_type::ObjectType;
 
 /// Dots along each side of the art, 22 mm.
@@ -96,23 +100,100 @@ fn bodies() -> Vec<Light> {
     INKS.0.stacks.iter().map(|stack| INKS.1.body(stack)).collect()
 }
 
-/// The light that the mixture of each colour has, which is what is asked.
-fn asked(art: &Art, kind: ObjectType) -> Vec<Light> {
-    let mixtures = Mixtures::<16>::new(&INKS.0, &INKS.1);
-    let (bodies, drawn) = (bodies(), kind != ObjectType::Picture);
+/// The light of each stack between black and paper.
+pub(super) fn lights() -> Vec<Light> {
+    INKS.0.stacks.iter().map(|stack| INKS.1.light(stack)).collect()
+}
+
+/// What mixtures of the stacks reach, found by trying.
+pub(super) struct Reach {
+    /// Planes through three stacks that have all on one side: outside, the first is less than the product.
+    planes: Vec<(f64, Light)>,
+    /// Mixtures of any three stacks, as light and in Oklab.
+    mixtures: Vec<(Light, Light)>,
+}
+
+impl Reach {
+    pub fn new(stacks: &[Light]) -> Reach {
+        /// Parts of a mixture.
+        const PARTS: usize = 40;
+        let product = |a: Light, b: Light| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let (mut planes, mut mixtures) = (Vec::new(), Vec::new());
+        for a in 0..stacks.len() {
+            for b in a + 1..stacks.len() {
+                for c in b + 1..stacks.len() {
+                    let corners = [stacks[a], stacks[b], stacks[c]];
+                    let [u, v] =
+                        [1, 2].map(|n| std::array::from_fn::<f64, 3, _>(|i| corners[n][i] - corners[0][i]));
+                    let normal =
+                        [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+                    let at = product(normal, corners[0]);
+                    let sides: Vec<f64> = stacks.iter().map(|&stack| product(normal, stack) - at).collect();
+                    let is_on = |sign: f64| sides.iter().all(|side| sign * side <= 1e-9);
+                    if is_on(1.0) && !is_on(-1.0) {
+                        planes.push((at, normal));
+                    } else if is_on(-1.0) && !is_on(1.0) {
+                        planes.push((-at, normal.map(|v| -v)));
+                    } else {
+                        continue;
+                    }
+                    let parts = (0..=PARTS).flat_map(|m| (0..=PARTS - m).map(move |n| [m, n, PARTS - m - n]));
+                    mixtures.extend(parts.map(|parts| {
+                        let of = |i| (0..3).map(|n| parts[n] as f64 / PARTS as f64 * corners[n][i]).sum();
+                        let light: Light = std::array::from_fn(of);
+                        (light, oklab(light))
+                    }));
+                }
+            }
+        }
+        Reach { planes, mixtures }
+    }
+
+    pub fn has(&self, light: Light) -> bool {
+        let product = |a: Light| a[0] * light[0] + a[1] * light[1] + a[2] * light[2];
+        self.planes.iter().all(|&(at, normal)| product(normal) <= at + 1e-9)
+    }
+
+    /// The nearest mixture of about the same hue, and how far it is, for what is beyond reach.
+    pub fn nearest(&self, light: Light) -> (Light, f64) {
+        let own = oklab(light);
+        let chroma = own[1].hypot(own[2]);
+        let far = |other: Light| (0..3).map(|i| (own[i] - other[i]).powi(2)).sum::<f64>().sqrt();
+        // Half a degree, or where there is hardly any colour.
+        let is_of_hue = |other: Light| {
+            let across = own[1] * other[2] - own[2] * other[1];
+            let along = own[1] * other[1] + own[2] * other[2];
+            along >= 0.0 && across.abs() <= chroma * (0.009 * other[1].hypot(other[2])).max(0.0005)
+        };
+        let of_hue = self.mixtures.iter().filter(|(_, other)| is_of_hue(*other));
+        let found = of_hue.map(|&(light, other)| (light, far(other))).min_by(|a, b| a.1.total_cmp(&b.1));
+        found.unwrap_or((light, 0.0))
+    }
+}
+
+pub(super) static REACH: std::sync::LazyLock<Reach> = std::sync::LazyLock::new(|| Reach::new(&lights()));
+
+/// The light of a colour of sRGB.
+pub(super) fn drawn(colour: [u8; 3]) -> Light {
+    colour.map(|v| f64::from(appearance::srgb::decode(f32::from(v) / 255.0)))
+}
+
+/// The light that is asked for each dot, relative to paper.
+fn asked(art: &Art) -> Vec<Light> {
+    let black = INKS.1.body(&INKS.0.stacks[usize::from(stack("K"))]);
     let mut known = std::collections::HashMap::new();
     let light = |&colour: &[u8; 3]| {
         *known.entry(colour).or_insert_with(|| {
-            let stops = if drawn { mixtures.flat(colour, drawn) } else { mixtures.stops(colour, drawn) };
-            let shares = shares(&stops).map(|share| f64::from(share) / f64::from(appearance::weights::ONE));
-            let of = |c: usize| (0..16).map(|q| shares[q] * bodies[usize::from(mixtures.order[q])][c]).sum();
-            std::array::from_fn(of)
+            let light = drawn(colour);
+            let light = if REACH.has(light) { light } else { REACH.nearest(light).0 };
+            std::array::from_fn(|c| black[c] + light[c] * (1.0 - black[c]))
         })
     };
     art.rgb.iter().map(light).collect()
 }
 
-/// The mean difference at .3 m between art at the dots and what is printed of it when it is read in pixels of `coarse` dots.
+/// The mean difference at .3 m between art at the dots and what is printed of it when it is read in pixels
+/// of `coarse` dots.
 fn figure(art: &Art, kind: ObjectType, coarse: usize) -> f64 {
     figure_by(Rules::USUAL, art, kind, coarse)
 }
@@ -122,7 +203,7 @@ pub(super) fn figure_by(rules: Rules, art: &Art, kind: ObjectType, coarse: usize
     let bodies = bodies();
     let dots = softened(art, coarse).dots_by(rules, kind, (art.width, art.height));
     let printed: Vec<Light> = dots.iter().map(|&dot| bodies[usize::from(dot)]).collect();
-    let (asked, printed) = (seen(&asked(art, kind), 0.3), seen(&printed, 0.3));
+    let (asked, printed) = (seen(&asked(art), 0.3), seen(&printed, 0.3));
     asked.iter().zip(&printed).map(|(&a, &b)| difference(a, b)).sum::<f64>() / asked.len() as f64
 }
 
@@ -263,7 +344,7 @@ fn screenshot() -> Art {
 }
 
 /// Something like a photograph: light that falls off, soft things and hard ones, and a texture at all scales.
-fn photograph() -> Art {
+pub(super) fn photograph() -> Art {
     let noise = |x: f64, y: f64, seed: f64| {
         (0..6).map(move |octave| {
             let f = 0.008 * 2f64.powi(octave);
@@ -293,7 +374,7 @@ fn an_eye_sees_what_was_asked() {
         ("grey text", text(&SIZES, GREY, [255; 3]), 1.0),
         ("orange text", text(&SIZES, ORANGE, [255; 3]), 1.0),
         ("pale text", text(&SIZES, PALE, [255; 3]), 1.0),
-        ("dark text on a tint", text(&SIZES, [40; 3], [200, 225, 250]), 2.5),
+        ("dark text on a tint", text(&SIZES, [40; 3], [200, 225, 250]), 3.3),
         ("white text on orange", text(&SIZES, [255; 3], ORANGE), 2.5),
         ("white text on grey", text(&SIZES, [255; 3], GREY), 2.5),
         ("grey lines", lines(GREY), 1.0),
@@ -318,8 +399,8 @@ fn an_eye_sees_what_was_asked() {
 fn an_eye_sees_pictures_as_they_were_asked_for() {
     let pictures = [
         ("map at 300 dpi", map(), ObjectType::Drawing, 2, 2.0),
-        ("screenshot at 150 dpi", screenshot(), ObjectType::Picture, 4, 2.5),
-        ("photograph at 300 dpi", photograph(), ObjectType::Picture, 2, 4.0),
+        ("screenshot at 150 dpi", screenshot(), ObjectType::Picture, 4, 3.0),
+        ("photograph at 300 dpi", photograph(), ObjectType::Picture, 2, 2.5),
     ];
     for (name, art, kind, coarse, most) in pictures {
         let found = figure(&art, kind, coarse);
@@ -342,7 +423,7 @@ fn ramps_have_no_bands() {
         let bodies = bodies();
         let dots = art.dots(ObjectType::Picture, (SIDE, SIDE));
         let printed: Vec<Light> = dots.iter().map(|&dot| bodies[usize::from(dot)]).collect();
-        let (asked, printed) = (seen(&asked(&art, ObjectType::Picture), 0.3), seen(&printed, 0.3));
+        let (asked, printed) = (seen(&asked(&art), 0.3), seen(&printed, 0.3));
         let mean = |lab: &[Light], y: usize| -> Light {
             std::array::from_fn(|c| {
                 lab[y * SIDE..(y + 1) * SIDE].iter().map(|lab| lab[c]).sum::<f64>() / SIDE as f64
@@ -353,7 +434,7 @@ fn ramps_have_no_bands() {
         let off: f64 = rows.clone().map(|y| difference(mean(&asked, y), mean(&printed, y))).sum();
         let off = off / rows.len() as f64;
         println!("ramp to {end:?}: {off:.2}");
-        assert!(off <= 0.8, "{end:?}: {off}");
+        assert!(off <= 1.3, "{end:?}: {off}");
     }
 }
 

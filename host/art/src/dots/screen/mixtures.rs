@@ -1,33 +1,43 @@
 //! The mixture of every colour, in the form in which a threshold picks from it.
 //!
-//! Problem: thirty million dots each need the stack that their threshold picks from the mixture of their colour.
-//! Method: the stacks lie in order of lightness on [0, 1), the darkest first, each with its share; [`Stops`] are where they end. So
-//! a threshold picks the stack whose number is how many stops it has reached. Stops are linear in the shares: those of the nodes
-//! of the `lattice` are interpolated like mixtures. In flat colours a share below [`Rules::least`] is dropped, since it would only be specks; the
+//! Problem: thirty million dots each need the stack that their threshold picks from the mixture of their
+//! colour.
+//! Method: the stacks lie in order of lightness on [0, 1), the darkest first, each with its share;
+//! [`Stops`] are where they end. So a threshold picks the stack whose number is how many stops it has
+//! reached. Stops are linear in the shares: those of the nodes of the `lattice` are interpolated like
+//! mixtures. In flat colours a share below [`Rules::least`] is dropped, since it would only be specks; the
 //! stacks next to it in lightness have it. The colours that are the name of a stack are that stack.
 //! Cost: 10 ns a colour. Limits: `N` stacks.
 
 use inks::Stack;
 
+use crate::colour::bound::{self, bound, seen};
 use crate::colour::fit::Fit;
-use crate::colour::intent::luminance;
+use crate::colour::intent::{Light, luminance};
 use crate::colour::lattice::{ALL, NODES};
 use crate::colour::solids::Solids;
 use appearance::weights::ONE;
 
-/// What decides about mixtures. A test moves each of these by a fifth.
+/// What decides about mixtures, and how dots hang together. A test moves each of these by a fifth.
 #[derive(Clone, Copy)]
 pub struct Rules {
-    /// The share that counts in a flat colour.
+    /// A share of a flat colour that is less is a speck.
     pub least: u16,
     /// The least difference in red, green or blue of the colours beside an edge.
     pub apart: u32,
     /// How much of what they can gain the stacks gain at an edge, in hundredths.
     pub part: u32,
+    /// In pictures: how much more a stack is owed that the dot before and the dot above have, in dots; by
+    /// halves for each.
+    pub hold: f64,
+    /// In pictures: how much more the darkest stack is owed than the palest where the threshold is lowest,
+    /// in dots.
+    pub noise: f64,
 }
 
 impl Rules {
-    pub const USUAL: Rules = Rules { least: (ONE as u32 * 3 / 100) as u16, apart: 40, part: 75 };
+    pub const USUAL: Rules =
+        Rules { least: (ONE as u32 * 3 / 100) as u16, apart: 40, part: 75, hold: 0.8, noise: 0.5 };
 }
 
 /// Where each stack ends, in the order of [`Mixtures::stacks`]; [`ONE`] after the last.
@@ -45,10 +55,11 @@ pub struct Mixtures<'a, const N: usize> {
     steps: [(usize, u32); 256],
     /// The lattice of pictures, and that of text and drawings.
     lattices: [usize; 2],
-    /// The number in that order of the stack that each corner of sRGB names; red, green and blue are a bit each.
+    /// The number in that order of the stack that each corner of sRGB names; red, green and blue are a bit
+    /// each.
     named: [Option<usize>; 8],
-    /// The light of each, relative to paper.
-    light: [f64; N],
+    /// The light of each between black and paper.
+    light: [Light; N],
     /// For each number in that order the number of the stack.
     pub order: [u8; N],
 }
@@ -59,9 +70,9 @@ impl<'a, const N: usize> Mixtures<'a, N> {
         let mut numbers: Vec<usize> = (0..fit.stacks.len()).collect();
         let of_each: Vec<f64> = fit.stacks.iter().map(|stack| luminance(solids.body(stack))).collect();
         numbers.sort_by(|&a, &b| of_each[a].total_cmp(&of_each[b]));
-        let (mut order, mut light) = ([0; N], [0.0; N]);
+        let (mut order, mut light) = ([0; N], [[0.0; 3]; N]);
         for (at, &number) in numbers.iter().enumerate() {
-            (order[at], light[at]) = (number as u8, of_each[number]);
+            (order[at], light[at]) = (number as u8, solids.light(&fit.stacks[number]));
         }
         let nodes = fit.shares().map(|shares| {
             let sums = numbers.iter().scan(0, |sum, &q| {
@@ -129,7 +140,8 @@ impl<'a, const N: usize> Mixtures<'a, N> {
     #[inline(always)]
     fn between(&self, colour: [u8; 3], drawn: bool) -> Stops<N> {
         let [x, y, z] = colour.map(|v| self.steps[usize::from(v)]);
-        // How far each axis goes in the upper half and its step in the lower one: sorted as numbers, without a branch.
+        // How far each axis goes in the upper half and its step in the lower one: sorted as numbers,
+        // without a branch.
         let axis = |far: u32, step: usize| far << 16 | step as u32;
         let [x_axis, y_axis, z_axis] = [axis(x.1, NODES * NODES), axis(y.1, NODES), axis(z.1, 1)];
         let (high, low) = (x_axis.max(y_axis), x_axis.min(y_axis));
@@ -157,25 +169,54 @@ impl<'a, const N: usize> Mixtures<'a, N> {
 
     /// The stops of a flat colour.
     pub fn flat(&self, colour: [u8; 3], drawn: bool) -> Stops<N> {
-        stops(&self.without_specks(shares(&self.stops(colour, drawn))))
+        let name = match () {
+            () if bound::is_full_black(colour) => self.named([0; 3]),
+            () if bound::is_paper(colour) => self.named([255; 3]),
+            () => None,
+        };
+        name.unwrap_or_else(|| stops(&self.without_specks(shares(&self.stops(colour, drawn)))))
     }
 
-    /// Such shares without those that are less than [`Rules::least`], the smallest first. Each goes to the stacks next to it in lightness, a darker and
-    /// a lighter one, in the parts that keep the lightness, or to the only one. So specks of several stacks may become one share that counts, and
-    /// no share that counts shrinks.
+    /// Such shares without those that are less than [`Rules::least`], the smallest first. Each goes to the
+    /// stacks next to it in lightness, a darker and a lighter one, in the parts that keep the lightness, or
+    /// to the only one, unless that would be seen. So specks of several stacks may become one share that
+    /// counts, and no share that counts shrinks.
     fn without_specks(&self, mut shares: [u16; N]) -> [u16; N] {
+        let asked = seen(self.mean(&shares));
+        let mut is_kept = [false; N];
         loop {
-            let specks = (0..N).filter(|&q| (1..self.rules.least).contains(&shares[q]));
-            let Some(speck) = specks.min_by_key(|&q| shares[q]) else { return shares };
-            let has_any = |&q: &usize| shares[q] > 0;
-            let (below, above) = ((0..speck).rev().find(has_any), (speck + 1..N).find(has_any));
-            let (Some(dark), Some(pale)) = (below.or(above), above.or(below)) else { return shares };
-            let (way, up) = (self.light[pale] - self.light[dark], self.light[speck] - self.light[dark]);
-            let lost = std::mem::take(&mut shares[speck]);
-            let paler = if way > 0.0 { (f64::from(lost) * up / way).round() as u16 } else { 0 };
-            shares[pale] += paler;
-            shares[dark] += lost - paler;
+            let is_speck = |&q: &usize| !is_kept[q] && (1..self.rules.least).contains(&shares[q]);
+            let Some(speck) = (0..N).filter(is_speck).min_by_key(|&q| shares[q]) else { return shares };
+            is_kept[speck] = true;
+            let without = self.without(shares, speck);
+            if bound(asked, seen(self.mean(&without))) {
+                shares = without;
+            }
         }
+    }
+
+    /// Shares whose number `speck` has gone to its neighbours.
+    fn without(&self, mut shares: [u16; N], speck: usize) -> [u16; N] {
+        let has_any = |&q: &usize| shares[q] > 0;
+        let (below, above) = ((0..speck).rev().find(has_any), (speck + 1..N).find(has_any));
+        let (Some(dark), Some(pale)) = (below.or(above), above.or(below)) else { return shares };
+        let light = |q: usize| luminance(self.light[q]);
+        let (way, up) = (light(pale) - light(dark), light(speck) - light(dark));
+        let lost = std::mem::take(&mut shares[speck]);
+        let paler = if way > 0.0 { (f64::from(lost) * up / way).round() as u16 } else { 0 };
+        shares[pale] += paler;
+        shares[dark] += lost - paler;
+        shares
+    }
+
+    /// The mean light of such shares.
+    pub fn mean(&self, shares: &[u16; N]) -> Light {
+        let mut mean = [0.0; 3];
+        for (&share, light) in shares.iter().zip(&self.light).filter(|(share, _)| **share > 0) {
+            let share = f64::from(share) / f64::from(ONE);
+            mean.iter_mut().zip(light).for_each(|(mean, light)| *mean += share * light);
+        }
+        mean
     }
 
     /// The stack, in that order, that a threshold picks.

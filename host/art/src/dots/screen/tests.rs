@@ -14,7 +14,6 @@ use appearance::document::SAMPLES;
 use appearance::gamut::Printable;
 use halftone::green_noise::USUAL;
 use inks::{InkSet, Library};
-use observe::Silent;
 use proptest::prelude::*;
 
 /// The built-in library's process inks, fitted.
@@ -29,7 +28,7 @@ pub(super) fn inks(intent: Intent) -> (Fit, Solids<'static>) {
         Box::leak(Box::new(Printable::from_library(&Library::builtin(), &process, &space)));
     let solids = Solids::new(printable, &space);
     let wishes = Wishes { intent, gamma: 1.0, has_drawings: true, has_pictures: true };
-    let fit = Fit::new((printable, &solids), space, &wishes, &Silent).unwrap();
+    let fit = Fit::new((printable, &solids), &space, &wishes).unwrap();
     (fit, solids)
 }
 
@@ -60,7 +59,9 @@ impl Art {
         let (fit, solids) = &*INKS;
         let mut mixtures = Mixtures::<16>::new(fit, solids);
         mixtures.rules = rules;
-        strips(&pixels.rows(dots, false), dots, STRIP, &mixtures, Table::for_cluster(USUAL))
+        let pictures = kind == ObjectType::Picture;
+        let strip = if pictures { STRIP_OF_PICTURES } else { STRIP };
+        strips(&pixels.rows(dots, false), dots, (strip, pictures), &mixtures, Table::for_cluster(USUAL))
     }
 
     fn at_dots(&self) -> Vec<u8> {
@@ -126,7 +127,7 @@ fn labels_are_in_the_nearest_solid() {
         let bytes = [tag, colour[0], colour[1], colour[2]].repeat(64 * 64);
         let pixels = Pixels { bytes, each: 4, width: 64, height: 64 };
         let (fit, solids) = &*INKS;
-        super::dots(pixels.rows((64, 64), labels), (64, 64), fit, solids, Table::for_cluster(USUAL))
+        super::dots(pixels.rows((64, 64), labels), (64, 64), (fit, solids), Table::for_cluster(USUAL), false)
     };
     let (dark, grey) = ([60; 3], [128; 3]);
     assert!(dots(dark, ObjectType::TEXT, true).iter().all(|&dot| dot == stack("K")));
@@ -222,7 +223,7 @@ proptest! {
         let (fit, solids) = &*INKS;
         let mixtures = Mixtures::<16>::new(fit, solids);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let strips = |height| strips(&rows, (200, 300), height, &mixtures, Table::for_cluster(USUAL));
+        let strips = |height| strips(&rows, (200, 300), (height, false), &mixtures, Table::for_cluster(USUAL));
         prop_assert!(pool.install(|| strips(height)) == strips(STRIP));
     }
 }
