@@ -214,7 +214,25 @@ mod tests {
     use art::Options;
     use files::shelf::Memory;
     use observe::Silent;
+    use protocol::rgl::Media;
     use readers::Pixels;
+
+    #[test]
+    fn on_film_white_lies_beneath_colours_and_beneath_metal_that_knocks_nothing_out() {
+        let reading = |media, curl_correction, knockout| {
+            let mut settings = Settings::default();
+            settings.page.handling = Handling { media, curl_correction };
+            settings.compose.knockout = knockout;
+            let Options { keep_white, over_white, .. } = settings.reading();
+            (keep_white, over_white.contains(Ink::MetallicGold))
+        };
+        let usual = art::Settings::default().knockout;
+        assert_eq!(reading(Media::Plain, true, usual), (false, false));
+        assert_eq!(reading(Media::Plain, false, usual), (true, false));
+        assert_eq!(reading(Media::Transparency, true, usual), (true, false));
+        assert_eq!(reading(Media::Cardboard, false, usual), (false, false));
+        assert_eq!(reading(Media::Plain, true, InkSet::EMPTY), (false, true));
+    }
 
     #[test]
     fn art_in_memory_becomes_a_job_with_a_pass_of_its_ink_and_what_is_missing_is_named() {

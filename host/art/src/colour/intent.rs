@@ -42,6 +42,8 @@ const AS_LIGHT: f64 = 0.8;
 /// The chroma at which it is half as far.
 const SATURATED: f64 = 0.15;
 /// Part of the way to the hull on which the perceptual intent changes nothing.
+/// Source: at .7, .85, .9 and .95 a screenshot differs by 3.2, 2.9, 2.8 and 2.8; the farther, the less is
+/// left for what lies beyond.
 const KNEE: f64 = 0.9;
 /// Steps of lightness in which the nearest printable colour is looked for, and how often they and those of
 /// chroma are halved then: far below what an eye sees.

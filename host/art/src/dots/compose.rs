@@ -120,11 +120,14 @@ pub fn compose(
             .join(", ");
         return Err(too_many_passes(passes, &inks));
     }
+    let planes: Vec<&Plane> = separations.iter().map(|separation| &separation.plane).collect();
+    let census = match settings.accept[..] {
+        [] => Vec::new(),
+        _ => pack::census(&planes, art.width, art.length),
+    };
     for &accepted in &settings.accept {
         let without = settings.accept.iter().copied().filter(|other| *other != accepted).collect();
         let without = Settings { accept: without, ..settings.clone() };
-        let planes: Vec<&Plane> = separations.iter().map(|separation| &separation.plane).collect();
-        let census = pack::census(&planes, art.width, art.length);
         let is_idle = match accepted {
             Accept::WhiteKept => art.white_kept == 0,
             _ => census.iter().enumerate().filter(|(_, count)| **count > 0).all(|(mask, _)| {

@@ -256,6 +256,27 @@ impl Process {
     }
 }
 
+/// A name in which `mark` and two hexadecimal digits stand for a byte.
+pub(crate) fn unescaped(name: &[u8], mark: u8) -> String {
+    let mut bytes = Vec::new();
+    let mut rest = name;
+    while let Some((&byte, after)) = rest.split_first() {
+        let digits = after.get(..2).filter(|two| byte == mark && two.iter().all(u8::is_ascii_hexdigit));
+        let digits = digits.and_then(|two| str::from_utf8(two).ok());
+        match digits.and_then(|two| u8::from_str_radix(two, 16).ok()) {
+            Some(code) => {
+                bytes.push(code);
+                rest = &after[2..];
+            }
+            None => {
+                bytes.push(byte);
+                rest = after;
+            }
+        }
+    }
+    text(&bytes)
+}
+
 /// Words of a program or a document in any encoding: each line is UTF-8, else Latin-1, so that unlike bytes stay unlike.
 pub(crate) fn text(bytes: &[u8]) -> String {
     let line = |line: &[u8]| match std::str::from_utf8(line) {

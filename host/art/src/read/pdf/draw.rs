@@ -235,23 +235,7 @@ fn plates(path: &Path, folder: &Scratch) -> Result<HashMap<String, Vec<(String, 
 
 /// The name of a plate from that of its file, where Ghostscript writes `%XX` for every byte that may not be in a file name.
 fn decoded(plate: &str) -> String {
-    let mut bytes = Vec::new();
-    let mut rest = plate.as_bytes();
-    while let Some((&byte, after)) = rest.split_first() {
-        let digits = after.get(..2).filter(|two| byte == b'%' && two.iter().all(u8::is_ascii_hexdigit));
-        let digits = digits.and_then(|two| std::str::from_utf8(two).ok());
-        match digits.and_then(|two| u8::from_str_radix(two, 16).ok()) {
-            Some(code) => {
-                bytes.push(code);
-                rest = &after[2..];
-            }
-            None => {
-                bytes.push(byte);
-                rest = after;
-            }
-        }
-    }
-    process::text(&bytes)
+    process::unescaped(plate.as_bytes(), b'%')
 }
 
 /// Separates a page into a TIFF for each plate beside `to`. Returns what Ghostscript says of them. If `overprints`, nothing that is drawn

@@ -153,7 +153,8 @@ impl Drawer {
 
     /// Why output ends early: the time limit, if that has passed.
     fn cut_short(&self, source: io::Error) -> DrawError {
-        self.process.passed().map_or(DrawError::Read(source), DrawError::Process)
+        let over = || self.over.as_ref().and_then(|over| over.process.passed());
+        self.process.passed().or_else(over).map_or(DrawError::Read(source), DrawError::Process)
     }
 
     /// Sees to it that all was drawn, and returns what Ghostscript said.

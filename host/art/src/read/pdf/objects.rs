@@ -127,22 +127,7 @@ pub(super) fn without(object: &[u8], left_out: impl Fn(&str) -> bool) -> Option<
 
 /// The text of a name.
 fn name(token: &[u8]) -> String {
-    let mut bytes = Vec::new();
-    let mut rest = token.strip_prefix(b"/").unwrap_or(token);
-    while let Some((&byte, after)) = rest.split_first() {
-        let code = after.get(..2).filter(|_| byte == b'#').and_then(|two| str::from_utf8(two).ok());
-        match code.and_then(|code| u8::from_str_radix(code, 16).ok()) {
-            Some(code) => {
-                bytes.push(code);
-                rest = &after[2..];
-            }
-            None => {
-                bytes.push(byte);
-                rest = after;
-            }
-        }
-    }
-    process::text(&bytes)
+    process::unescaped(token.strip_prefix(b"/").unwrap_or(token), b'#')
 }
 
 /// An object with other tokens where there are any for one and the one before it.
