@@ -192,9 +192,8 @@ impl Sheet {
     /// # Panics
     /// When the area leaves the sheet: a bug of the caller, never a matter of input.
     pub fn in_colours(&self, area: Area, dpi: (u16, u16)) -> std::io::Result<Vec<u8>> {
-        let rows = self.index().chunks_exact(self.width()).skip(area.top).take(area.length);
-        let dots: Vec<u8> = rows.flat_map(|row| &row[area.left..][..area.width]).copied().collect();
-        encoded((area.width, area.length), dpi, Exact::Indexed(&colours(self.stacks())), &dots)
+        let palette = colours(self.stacks());
+        encoded((area.width, area.length), dpi, Exact::Indexed(&palette), &self.index_of(area, 1))
     }
 
     /// Reads what [`Sheet::save`] wrote. Anything that does not fit is an error with the file and the field.

@@ -24,6 +24,8 @@ pub mod picture;
 mod plane;
 mod size;
 
+use std::borrow::Cow;
+
 use inks::Stack;
 use protocol::paper::Paper;
 
@@ -89,6 +91,20 @@ impl Sheet {
     /// The stack number of every dot, row by row.
     pub fn index(&self) -> &[u8] {
         self.dots.index()
+    }
+
+    /// The stack numbers of an area, row by row, each row so many `times`.
+    ///
+    /// # Panics
+    /// If the area leaves the sheet, which is a bug of the caller.
+    pub fn index_of(&self, area: Area, times: usize) -> Cow<'_, [u8]> {
+        let width = self.width();
+        let rows = &self.index()[area.top * width..][..area.length * width];
+        if area.width == width && times == 1 {
+            return rows.into();
+        }
+        let rows = rows.chunks_exact(width).map(|row| &row[area.left..][..area.width]);
+        rows.flat_map(|row| std::iter::repeat_n(row, times)).collect::<Vec<_>>().concat().into()
     }
 
     /// How many dots each stack has.

@@ -122,14 +122,15 @@ impl<F: Fn(usize, usize) -> Key + Sync> Edges<F> {
     fn own(&self, x: usize, y: usize) -> Between {
         let own = self.at((x, y));
         let is_corner = colour(own).iter().all(|&v| v == 0 || v == 255);
-        if is_corner || !self.near[y * self.width + x] || self.is_flat((x, y)) {
+        if is_corner || !self.near[y * self.width + x] {
+            return Between::Plain(own);
+        }
+        let is_like = |place: &(usize, usize)| self.is_tone(&[own, self.at(*place)]);
+        let is_area = self.around((x, y)).filter(is_like).nth(self.rules.area - 1).is_some();
+        if is_area || self.is_flat((x, y)) {
             return Between::Plain(own);
         }
         let places: Vec<(usize, usize)> = self.around((x, y)).collect();
-        let like = places.iter().filter(|place| self.is_tone(&[own, self.at(**place)])).count();
-        if like >= self.rules.area {
-            return Between::Plain(own);
-        }
         self.edge(&places, [own; 4]).unwrap_or(Between::Plain(own))
     }
 

@@ -69,12 +69,14 @@ pub(crate) fn dots(
     let strip = if pictures { STRIP_OF_PICTURES } else { STRIP };
     // Sixteen are the stacks of four inks in one order.
     match fit.stacks.len() {
-        ..=16 => strips::<16>(&rows, (width, height), (strip, pictures), &Mixtures::new(fit, solids), table),
-        _ => strips::<256>(&rows, (width, height), (strip, pictures), &Mixtures::new(fit, solids), table),
+        ..=16 => {
+            strips::<16, 1>(&rows, (width, height), (strip, pictures), &Mixtures::new(fit, solids), table)
+        }
+        _ => strips::<256, 16>(&rows, (width, height), (strip, pictures), &Mixtures::new(fit, solids), table),
     }
 }
 
-fn strips<const N: usize>(
+fn strips<const N: usize, const L: usize>(
     rows: &(impl Fn(Range<usize>, &mut [Key]) + Sync),
     (width, height): (usize, usize),
     (strip, pictures): (usize, bool),
@@ -88,7 +90,7 @@ fn strips<const N: usize>(
         read.read(rows, (width, height), (top.min(early), top..top + out.len() / width));
         wide(
             #[inline(always)]
-            || read.pick(mixtures, pictures, table, out),
+            || read.pick::<N, L>(mixtures, pictures, table, out),
         );
     });
     index
@@ -158,7 +160,7 @@ impl Strip {
     }
 
     #[inline(always)]
-    fn pick<const N: usize>(
+    fn pick<const N: usize, const L: usize>(
         &self,
         mixtures: &Mixtures<'_, N>,
         pictures: bool,
@@ -167,7 +169,7 @@ impl Strip {
     ) {
         let mut leans = Leans::new(&self.keys, &self.even, mixtures.rules.apart);
         let mut known = Known::new(mixtures);
-        let mut diffusion = pictures.then(|| Diffusion::new(self.width, mixtures.rules));
+        let mut diffusion = pictures.then(|| Diffusion::<L>::new(self.width, mixtures.rules));
         let row = |y: usize| &self.keys[y * self.width..(y + 1) * self.width];
         if let Some(diffusion) = &mut diffusion {
             for before in (1..=self.early).rev() {

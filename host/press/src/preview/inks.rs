@@ -62,10 +62,8 @@ impl FromStr for Ground {
 /// If the area leaves the sheet, which is a bug of the caller.
 pub fn sheet_in_inks(sheet: &Sheet, area: Area, across: usize, ground: Ground) -> io::Result<Vec<u8>> {
     let palette: Vec<[u8; 3]> = sheet.stacks().iter().map(|stack| upon(stack, ground.0)).collect();
-    let rows = sheet.index().chunks_exact(sheet.width()).skip(area.top).take(area.length);
-    let rows = rows.flat_map(|row| std::iter::repeat_n(row, across));
-    let dots: Vec<u8> = rows.flat_map(|row| &row[area.left..][..area.width]).copied().collect();
-    encoded((area.width, area.length * across), square(across), Exact::Indexed(&palette), &dots)
+    let size = (area.width, area.length * across);
+    encoded(size, square(across), Exact::Indexed(&palette), &sheet.index_of(area, across))
 }
 
 /// Pixels per inch of a picture in the sheet's shape.

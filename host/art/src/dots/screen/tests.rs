@@ -61,7 +61,13 @@ impl Art {
         mixtures.rules = rules;
         let pictures = kind == ObjectType::Picture;
         let strip = if pictures { STRIP_OF_PICTURES } else { STRIP };
-        strips(&pixels.rows(dots, false), dots, (strip, pictures), &mixtures, Table::for_cluster(USUAL))
+        strips::<16, 1>(
+            &pixels.rows(dots, false),
+            dots,
+            (strip, pictures),
+            &mixtures,
+            Table::for_cluster(USUAL),
+        )
     }
 
     fn at_dots(&self) -> Vec<u8> {
@@ -223,7 +229,7 @@ proptest! {
         let (fit, solids) = &*INKS;
         let mixtures = Mixtures::<16>::new(fit, solids);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let strips = |height| strips(&rows, (200, 300), (height, false), &mixtures, Table::for_cluster(USUAL));
+        let strips = |height| strips::<16, 1>(&rows, (200, 300), (height, false), &mixtures, Table::for_cluster(USUAL));
         prop_assert!(pool.install(|| strips(height)) == strips(STRIP));
     }
 }
