@@ -438,10 +438,10 @@ fn alum_bronze_of_the_data_set() {
     }
 }
 
-/// 24 photographs of 12 megapixels: time and memory. `cargo test -p foilpress-measure --test rendered -- --ignored --nocapture`
+/// 24 photographs of 12 megapixels: memory, and the time beside it, which depends on what else the computer does.
 #[test]
 #[ignore = "writes a gigabyte and takes minutes"]
-fn time_and_memory_of_24_large_photographs() {
+fn memory_of_24_large_photographs() {
     let Some(script) = renderer() else { return };
     let material = &MATERIALS[3];
     let rendered = Rendered::new(&script, material, ", size=(1000, 750), ss=2");
@@ -476,5 +476,5 @@ fn time_and_memory_of_24_large_photographs() {
     let score = score(&taken, material);
     report("24 large photographs", &taken, &score);
     println!("{took:.1} s, at most {peak:.2} GB ({before:.2} GB before)");
-    assert!(score.worst < 0.08 && took < 60.0 && peak < 2.0, "{score:?} {took} {peak}");
+    assert!(score.worst < 0.08 && peak < 2.0, "{score:?} {peak}");
 }
