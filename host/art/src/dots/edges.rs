@@ -9,7 +9,7 @@
 //! Where pixels are dots, one that is softened takes the nearer of the two colours.
 //! A stroke may be nowhere as dark as it was drawn. So the colour of one that fills no 2 x 2 pixels is the one that is farthest from the
 //! ground where the stroke goes on within [`Rules::far_mm`], unless less than [`Rules::stroke`] of that colour is left here.
-//! Cost: 5 ns a dot, some 300 ns at an edge; a byte a pixel. Limits: corners are rounded by half a pixel; what is fainter than
+//! Cost: 5 ns a dot, 60 ns where pixels are dots, some 300 ns at an edge; a byte a pixel. Limits: corners are rounded by half a pixel; what is fainter than
 //! [`Rules::tone`] is a tone.
 
 use std::ops::Range;

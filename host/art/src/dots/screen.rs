@@ -8,7 +8,7 @@
 //! between flat dots the mixture leans towards the edge (`lean`). The dots of pictures also know what those
 //! before them printed (`diffusion`). Strips of rows are made independently of each other; each reads
 //! [`HALO`] rows beyond itself. Blocks of one colour are found first, since most of a page is paper.
-//! Cost: some 30 ns a dot of a photograph, 1 ns of a page of text. Memory: a byte a dot, and a strip for
+//! Cost: some 80 ns a dot of a photograph, 1 ns of a page of text. Memory: a byte a dot, and a strip for
 //! each thread.
 //! Limits: process inks, and colours of 8 bits.
 //! Source: `green_noise` of the halftone for the table; three examinations by a model of the eye for the

@@ -161,9 +161,9 @@ fn choose<const N: usize, const L: usize>(
         Mixtures::pick(stops, threshold) as i16
     } else {
         // From the darkest to the palest stack of the mixture, as far as the threshold lies from its middle;
-        // in sixteenths, of whose products the upper half is what counts.
+        // times sixteen, so that the upper half of its products are dots.
         let off = i32::from(DOT) / 2 - i32::from(threshold >> SHIFT);
-        let favour = i16x16::splat(((noise * off) >> (DOT.trailing_zeros() - 4)) as i16);
+        let favour = i16x16::splat((16 * (noise * off / i32::from(DOT))) as i16);
         let hold = i16x16::splat(hold);
         let scores: Lanes<L> = std::array::from_fn(|l| {
             let middle = i16x16::splat(DOT) - starts[l] - ends[l];
