@@ -4,7 +4,8 @@
 //! Method: files are read where they lie in the archive and nothing is written to disk. Names must stay inside; no entry may be a
 //! link, encrypted, or share its bytes with another; counts and sizes have limits, which hold for the bytes that come out,
 //! whatever the archive says. The table of contents is counted before it is read.
-//! Cost: one file at a time in memory. Limits: stored or deflated entries; what macOS adds under `__MACOSX` is left out.
+//! Cost: one file at a time in memory. Limits: stored or deflated entries; what macOS adds under `__MACOSX` is left out; an archive
+//! that holds nothing but an archive is read as that, and no deeper.
 
 use std::collections::BTreeMap;
 use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom};
@@ -89,6 +90,14 @@ impl Archive {
         }
         let open = Mutex::new(Open { zip, left: MOST_OUT });
         Ok(Archive { path: path.to_path_buf(), files, open })
+    }
+
+    /// The archive inside, if it is the only file: some sites pack what they pack.
+    pub(super) fn only_archive(&self) -> Option<&Path> {
+        let mut files = self.files.keys();
+        let (only, others) = (files.next()?, files.next());
+        let is_zip = only.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("zip"));
+        (is_zip && others.is_none()).then_some(only)
     }
 
     /// The path inside.

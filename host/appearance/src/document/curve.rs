@@ -17,7 +17,18 @@ pub(super) const MOST_BYTES: u64 = 16 << 20;
 /// Opens a curve file.
 pub(super) fn open(path: &Path, space: Space, mut source: Source<'_>) -> Result<Document, DocumentError> {
     let bytes = source.read(path, MOST_BYTES)?;
-    let curve = Curve::from_csv(&bytes[..], path)?;
+    let header =
+        String::from_utf8_lossy(bytes.split(|&b| b == b'\n').next().unwrap_or_default()).to_ascii_lowercase();
+    let curve = Curve::from_csv(&bytes[..], path).map_err(|error| match header.contains("theta") {
+        true => DocumentError::from(error),
+        false => DocumentError::Settings {
+            path: path.to_path_buf(),
+            problem:
+                "line 1 is not the header `theta_h_deg,r,g,b` of a curve; readings of a gloss meter or a \
+                      spectrophotometer become one with `foilpress inks from`"
+                    .into(),
+        },
+    })?;
     document(&curve, path, space, source)
 }
 

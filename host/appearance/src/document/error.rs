@@ -1,10 +1,11 @@
 //! Errors in reading and writing documents: the file, the field, and what was expected.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use files::FileError;
 use inks::CurveError;
 
+use super::names::has_extension;
 use crate::sample::UnknownSample;
 use crate::weights::WeightError;
 
@@ -16,13 +17,22 @@ pub enum DocumentError {
     File(#[from] FileError),
     /// The path is not a kind of document.
     #[error(
-        "{}: unknown kind of document; expected a folder of texture maps or its .zip, a factored document, a .gltf, .glb, .mtlx, \
-         MERL .binary, RGL .bsdf, goniometer .brdf or curve .csv file, or `sample:NAME`",
+        "{}: unknown kind of document; expected a folder of texture maps or its .zip, a factored \
+         document, a .gltf, .glb, .mtlx, .usda, .usdz, .mtl, MERL .binary, RGL .bsdf, goniometer .brdf or \
+         curve .csv file, or `sample:NAME`",
         path.display()
     )]
     Kind {
         /// The file.
         path: PathBuf,
+    },
+    /// A kind of document that is known and not read.
+    #[error("{}: {way}", path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// What it is, and what to open in its place.
+        way: &'static str,
     },
     /// The file is not a measured BRDF.
     #[error(
@@ -112,6 +122,55 @@ pub enum DocumentError {
         /// What is wrong.
         source: WeightError,
     },
+}
+
+impl DocumentError {
+    /// The error for a file whose name says that it is of a kind that is known and not read.
+    pub(super) fn foreign(path: &Path) -> Option<DocumentError> {
+        let way = way_out(&path.file_name()?.to_string_lossy())?;
+        Some(DocumentError::Foreign { path: path.to_path_buf(), way })
+    }
+}
+
+/// What a file is that is not read, by the ending of its name, and what to do.
+pub(super) fn way_out(name: &str) -> Option<&'static str> {
+    const WAYS: [(&[&str], &str); 7] = [
+        (
+            &["axf"],
+            "AxF is a closed format; export its maps as pictures (diffuse, specular, roughness, \
+             normal) and open their folder",
+        ),
+        (
+            &["sbsar", "sbs"],
+            "a Substance file draws its maps when it is asked; export base colour, roughness and \
+             metallic as pictures, and open their folder",
+        ),
+        (
+            &["mdl"],
+            "MDL is a program and not a set of maps; bake it to a glTF or MaterialX file with \
+             pictures",
+        ),
+        (
+            &["fbx", "blend", "obj", "max", "ma", "mb", "c4d", "3ds", "dae"],
+            "a scene of another program; export its material as glTF, MaterialX or text USD, or open \
+             the folder of its maps",
+        ),
+        (
+            &["dds", "ktx", "ktx2"],
+            "a texture packed for a graphics card; save it as PNG, and open the folder of all maps",
+        ),
+        (
+            &["btf"],
+            "a BTF has a measurement for every pixel and direction; fit maps of base colour, \
+             roughness and metallic to it first",
+        ),
+        (
+            &["bin"],
+            "numbers without their meaning: of a glTF file, open the .gltf; of a UTIA measurement, \
+             average it over the half angle to a curve .csv",
+        ),
+    ];
+    WAYS.iter().find(|(endings, _)| has_extension(name, endings)).map(|(_, way)| *way)
 }
 
 /// The names as a list, cut off after 24.

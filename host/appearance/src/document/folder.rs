@@ -1,9 +1,10 @@
 //! A folder of texture maps as a document.
 //!
 //! The maps are base colour, roughness and metallic (separate, or packed as occlusion-roughness-metallic or
-//! metallic-smoothness), or diffuse, specular and glossiness; a normal map adds to roughness ([`super::relief`]), and a clear
-//! coat lies over either. Files are recognised by name ([`super::names`]) or listed in [`SETTINGS`]. All maps are resized to
-//! the base colour. The notes report which encoding was assumed, what was resized and what was left out.
+//! metallic-smoothness), or diffuse, specular and glossiness; a normal map adds to roughness
+//! ([`super::relief`]), and a clear coat lies over either. Files are recognised by name ([`super::names`])
+//! or listed in [`SETTINGS`]. All maps are resized to the base colour. The notes report which encoding was
+//! assumed, what was resized and what was left out.
 
 mod files;
 mod locate;
@@ -14,11 +15,11 @@ use std::path::Path;
 use super::content::MOST_BYTES;
 use super::content::{Content, Document, Options};
 use super::error::DocumentError;
-use super::layers::CoatLayer;
 use super::names::{self, Role};
 use super::picture::{Encoding, Picture};
 use super::relief;
 use super::source::Source;
+use super::texture::layers::CoatLayer;
 use super::texture::{Field, Plane, same_shape};
 use crate::brdf::Space;
 use crate::materials::{Surface, Surfaces, dielectric, metallic, specular};
@@ -101,13 +102,28 @@ impl Reader<'_, '_> {
     /// A map with one number per pixel.
     fn single(&mut self, role: Role) -> Result<Option<Field>, DocumentError> {
         let Some(name) = self.files.one(role)? else { return Ok(None) };
+        if let Some(channel) = self.files.channel(role) {
+            let path = self.files.folder.join(&name);
+            let bytes = self.source.read(&path, MOST_BYTES)?;
+            let picture = Picture::decode_with_alpha(&bytes, &path, self.source)?;
+            let has = if channel == 3 { picture.has_alpha() } else { channel < picture.colours() };
+            if !has {
+                let letter = ["r", "g", "b", "a"][channel];
+                let problem =
+                    format!("it has no channel {letter}, which {SETTINGS} names for {}", role.name());
+                return Err(DocumentError::Picture { path, problem });
+            }
+            self.source.observer.advance(1);
+            return self.data(&name, &picture, channel).map(Some);
+        }
         let picture = self.picture(&name)?;
         if !picture.is_grey() {
             return Err(DocumentError::Picture {
                 path: self.files.folder.join(&name),
                 problem: format!(
-                    "expected one {} value per pixel, found colours; if this is a packed map, name it \
-                     occlusion_roughness_metallic",
+                    "expected one {} value per pixel, found colours; if this is a packed map, {SETTINGS} names a channel \
+                     under [maps], as in `{} = \"{name}:g\"`",
+                    role.name(),
                     role.name()
                 ),
             });
@@ -251,7 +267,10 @@ fn workflow_of(files: &Files, settings: &FolderSettings) -> Result<Workflow, Doc
     let has = |role| files.by_role.iter().any(|(r, _)| *r == role);
     let packed = has(Role::Packed) || has(Role::MetallicSmoothness);
     let rough = has(Role::Roughness) || packed || settings.roughness.is_some();
-    match (rough, has(Role::Glossiness) || has(Role::SpecularSmoothness)) {
+    let in_normal = files.all(Role::Normal).iter().any(|name| names::has_gloss(name));
+    match (rough, has(Role::Glossiness) || has(Role::SpecularSmoothness) || in_normal) {
+        (_, true) if in_normal && has(Role::Metallic) => Ok(Workflow::MetallicRoughness),
+        (true, true) if in_normal => Ok(Workflow::MetallicRoughness),
         (true, false) => Ok(Workflow::MetallicRoughness),
         (true, true) if has(Role::Metallic) || packed => Ok(Workflow::MetallicRoughness),
         (true, true) => Err(files.error(format!(
@@ -286,15 +305,21 @@ fn roughness_metallic(
             } else if picture.colours() != 3 {
                 return Err(DocumentError::Picture {
                     path: reader.files.folder.join(&name),
-                    problem: "expected three channels (occlusion, roughness, metallic), found grey".into(),
+                    problem: "its name says that three channels are packed in it, found grey".into(),
                 });
             } else {
-                reader.source.note(format!("{name}: roughness is read from green, metallic from blue"));
+                const LETTERS: [&str; 3] = ["red", "green", "blue"];
+                let (of_roughness, of_metal) = names::packing(&name);
+                let also = of_metal.map(|channel| format!(", metallic from {}", LETTERS[channel]));
+                let from = LETTERS[of_roughness];
+                reader
+                    .source
+                    .note(format!("{name}: roughness is read from {from}{}", also.unwrap_or_default()));
                 if roughness.is_none() {
-                    roughness = Some(reader.data(&name, &picture, 1)?);
+                    roughness = Some(reader.data(&name, &picture, of_roughness)?);
                 }
-                if metal.is_none() {
-                    metal = Some(reader.data(&name, &picture, 2)?);
+                if let (None, Some(channel)) = (&metal, of_metal) {
+                    metal = Some(reader.data(&name, &picture, channel)?);
                 }
             }
         }
@@ -305,12 +330,15 @@ fn roughness_metallic(
         } else {
             let picture = reader.smooth(&name)?;
             if roughness.is_none() {
-                roughness = Some(inverted(reader.data(&name, &picture, 3)?));
+                roughness = Some(reader.data(&name, &picture, 3)?.inverted());
             }
             if metal.is_none() {
                 metal = Some(reader.data(&name, &picture, 0)?);
             }
         }
+    }
+    if roughness.is_none() {
+        roughness = gloss_of_normal(reader)?.map(Field::inverted);
     }
     for role in [Role::Specular, Role::Glossiness, Role::SpecularSmoothness] {
         if let Some(name) = reader.files.all(role).first() {
@@ -344,10 +372,10 @@ fn specular_glossiness(
             gloss = Some(reader.data(&name, &picture, 3)?);
         }
     }
-    let gloss = match gloss {
+    let gloss = match gloss.map_or_else(|| gloss_of_normal(reader), |gloss| Ok(Some(gloss)))? {
         Some(gloss) => gloss,
         None => match reader.single(Role::Roughness)? {
-            Some(roughness) => inverted(roughness),
+            Some(roughness) => roughness.inverted(),
             None => {
                 return Err(reader
                     .files
@@ -370,15 +398,17 @@ fn specular_glossiness(
     Ok((f0, gloss))
 }
 
-/// One minus a map: roughness from smoothness.
-fn inverted(field: Field) -> Field {
-    match field {
-        Field::Map(plane) => Field::Map(plane.map(|v| 1.0 - v)),
-        Field::Constant(value) => Field::Constant(1.0 - value),
-    }
+/// The glossiness in the alpha of a normal map whose name says so.
+fn gloss_of_normal(reader: &mut Reader<'_, '_>) -> Result<Option<Field>, DocumentError> {
+    let Some(name) = reader.files.one(Role::Normal)?.filter(|name| names::has_gloss(name)) else {
+        return Ok(None);
+    };
+    let picture = reader.smooth(&name)?;
+    reader.data(&name, &picture, 3).map(Some)
 }
 
-/// The clear coat, if there is one. A coat that two maps describe is left out: the material is there without it.
+/// The clear coat, if there is one. A coat that two maps describe is left out: the material is there
+/// without it.
 fn coat(reader: &mut Reader<'_, '_>, settings: &FolderSettings) -> Result<Option<CoatLayer>, DocumentError> {
     for role in [Role::Coat, Role::CoatRoughness] {
         let several = reader.files.all(role);
@@ -402,8 +432,8 @@ fn coat(reader: &mut Reader<'_, '_>, settings: &FolderSettings) -> Result<Option
     Ok(Some(CoatLayer { weight, roughness, f0: dielectric(1.5) }))
 }
 
-/// The slope variance of a normal map, at the size of the base colour. The window covers the same area of the document for
-/// any size of the normal map.
+/// The slope variance of a normal map, at the size of the base colour. The window covers the same area of
+/// the document for any size of the normal map.
 fn normal_variance(reader: &mut Reader<'_, '_>, name: &str) -> Result<Field, DocumentError> {
     let picture = reader.picture(name)?;
     if picture.colours() != 3 {

@@ -15,11 +15,11 @@ use std::path::Path;
 use super::content::MOST_BYTES;
 use super::content::{ColourSpace, Content, Document, Options, SWATCH_MM};
 use super::error::DocumentError;
-use super::layers::{CoatLayer, Layers, PbrWorkflow, build};
 use super::picture::Picture;
 use super::relief;
 use super::source::Source;
 use super::texture::Field;
+use super::texture::layers::{CoatLayer, Layers, PbrWorkflow, build};
 use crate::brdf::Space;
 use crate::materials::dielectric;
 

@@ -13,18 +13,16 @@ use std::path::Path;
 
 use roxmltree::{Node, ParsingOptions};
 
-use super::content::MOST_BYTES;
 use super::content::{Content, Document, Options, SWATCH_MM};
 use super::error::DocumentError;
-use super::layers::{CoatLayer, Layers, PbrWorkflow, build};
-use super::picture::Picture;
-use super::relief;
+use super::inputs::{Inputs, Value};
 use super::source::Source;
 use super::texture::Field;
+use super::texture::layers::{CoatLayer, Layers, PbrWorkflow, build};
 use crate::brdf::Space;
 use crate::materials::dielectric;
 
-use graph::{Graph, Link, MOST_NODES, Value};
+use graph::{Graph, Link, MOST_NODES};
 
 /// The largest file: far more than any graph; pictures lie beside it, and this is held in memory as a tree.
 const MOST_TEXT: u64 = 16 << 20;
@@ -164,7 +162,7 @@ pub(super) fn open(
         source.note(format!("{}: inputs that are not printed: {}", path.display(), unread.join(", ")));
     }
     source.observer.begin("reading", inputs().filter(|input| !input.has_attribute("value")).count() as u64);
-    let mut reader = Reader { graph: &graph, surface, source: &mut source };
+    let mut reader = Reader { graph: &graph, surface, inputs: Inputs { path, source: &mut source } };
     let layers = reader.layers(shader)?;
     let (surfaces, textured) = build(layers, path, space, &mut source)?;
     source.observer.end();
@@ -234,7 +232,7 @@ fn choose<'d>(graph: &Graph<'d, '_>, asked: Option<&str>) -> Result<(String, Nod
 struct Reader<'a, 'd, 's> {
     graph: &'a Graph<'d, 'a>,
     surface: Node<'d, 'd>,
-    source: &'a mut Source<'s>,
+    inputs: Inputs<'a, 's>,
 }
 
 impl Reader<'_, '_, '_> {
@@ -242,62 +240,19 @@ impl Reader<'_, '_, '_> {
         graph::input(&self.surface, name).map(|input| self.graph.value(&input)).transpose()
     }
 
-    fn picture(&mut self, image: &graph::Image) -> Result<Picture, DocumentError> {
-        let bytes = self.source.read(&image.file, MOST_BYTES)?;
-        let picture = Picture::decode(&bytes, &image.file, self.source)?;
-        if let Some(note) = &image.note {
-            self.source.note(note.clone());
-        }
-        self.source.observer.advance(1);
-        Ok(picture)
-    }
-
-    /// An input with one number per pixel.
     fn single(&mut self, (name, default): (&str, f32)) -> Result<Field, DocumentError> {
-        Ok(match self.value(name)? {
-            None => Field::Constant(default),
-            Some(Value::Numbers(numbers)) => Field::Constant(numbers[0]),
-            Some(Value::Image(image)) => {
-                let picture = self.picture(&image)?;
-                let plane = picture.channel(image.channel.unwrap_or(0));
-                if plane.outside().is_some() {
-                    return Err(self
-                        .graph
-                        .wrong(name, format!("{}: values are 0 to 1", image.file.display())));
-                }
-                Field::Map(plane).times(image.factor[0])
-            }
-        })
+        let value = self.value(name)?;
+        self.inputs.single(name, value, default)
     }
 
     fn colour(&mut self, name: &str, default: f32) -> Result<[Field; 3], DocumentError> {
-        Ok(match self.value(name)? {
-            None => [default; 3].map(Field::Constant),
-            Some(Value::Numbers(numbers)) => {
-                std::array::from_fn(|c| Field::Constant(*numbers.get(c).unwrap_or(&numbers[0])))
-            }
-            Some(Value::Image(image)) => {
-                let picture = self.picture(&image)?;
-                self.source.note(format!("{}: {name} read as {}", image.file.display(), image.words()));
-                let planes = picture.linear(image.encoding);
-                let mut factors = image.factor.into_iter();
-                match image.channel {
-                    Some(channel) => {
-                        let plane = &planes[channel.min(2)];
-                        std::array::from_fn(|c| Field::Map(plane.clone()).times(image.factor[c]))
-                    }
-                    None => planes.map(|plane| Field::Map(plane).times(factors.next().unwrap_or(1.0))),
-                }
-            }
-        })
+        let value = self.value(name)?;
+        self.inputs.colour(name, value, [default; 3])
     }
 
-    /// An input that may only be a number.
     fn number(&mut self, (name, default): (&str, f32)) -> Result<f32, DocumentError> {
-        match self.single((name, default))? {
-            Field::Constant(value) => Ok(value),
-            Field::Map(_) => Err(self.graph.wrong(name, "a picture is not read here; set a number".into())),
-        }
+        let value = self.value(name)?;
+        self.inputs.number(name, value, default)
     }
 
     fn layers(&mut self, shader: &Shader) -> Result<Layers, DocumentError> {
@@ -312,23 +267,8 @@ impl Reader<'_, '_, '_> {
             None => [plain; 3].map(Field::Constant),
         };
         let coat = self.coat(shader)?;
-        let variance = match self.value(shader.normal)? {
-            Some(Value::Image(image)) => {
-                let picture = self.picture(&image)?;
-                let name = image.file.display().to_string();
-                if picture.colours() != 3 {
-                    return Err(self
-                        .graph
-                        .wrong(shader.normal, format!("{name}: expected three components")));
-                }
-                let scale = base[0].size().map_or(1.0, |(width, _)| picture.width as f64 / width as f64);
-                let radius = (scale * (relief::WINDOW / 2) as f64).round().clamp(1.0, 256.0) as usize;
-                self.source.note(relief::note(&name));
-                let (x, y) = (picture.channel(0), picture.channel(1));
-                Some(Field::Map(relief::slope_variance(&x, &y, image.factor[0], radius)))
-            }
-            _ => None,
-        };
+        let normal = self.value(shader.normal)?;
+        let variance = self.inputs.normal(shader.normal, normal, base[0].size())?;
         Ok(Layers { base, kind: PbrWorkflow::Metallic { roughness, metal, f0, level }, variance, coat })
     }
 

@@ -7,6 +7,7 @@
 
 mod archive;
 mod average;
+mod colours;
 mod content;
 mod curve;
 mod error;
@@ -16,20 +17,20 @@ mod gltf;
 mod gonio;
 #[cfg(test)]
 mod hostile;
-mod layers;
+mod inputs;
 mod materialx;
 mod merl;
+mod mtl;
 mod names;
 mod open;
 pub(crate) mod picture;
-mod primaries;
 mod relief;
 mod rgl;
 mod sample;
 pub(crate) mod source;
 mod spectrum;
-mod tensor;
 pub(crate) mod texture;
+mod usd;
 
 pub use content::{ColourSpace, Content, Document, MOST_BYTES, Options, SAMPLES, name_of};
 pub use error::DocumentError;

@@ -1,10 +1,12 @@
 //! The role of a texture file from its name, by the conventions of texture sites and painting programs.
 //!
 //! Problem: `Metal053C_1K-JPG_NormalGL.jpg`, `rusty_metal_02_arm_2k.png`, `T_Rock_BC.tga`, `albedo.jpg`.
-//! Method: the stem is split into lower-case words at punctuation and where a capital follows a lower-case letter. Words
-//! that most files of the folder begin with are the name of the material and are skipped (so `rusty_metal_diff` is not a
-//! metallic map, whatever else lies in the folder). Words about size and format are dropped. The longest run of the remaining words that names a role,
-//! furthest to the right, decides. Single letters count only as the last word, as in Unreal's suffixes.
+//! Method: the stem is split into lower-case words at punctuation and where a capital follows a lower-case
+//! letter. Words that most files of the folder begin with are the name of the material and are skipped (so
+//! `rusty_metal_diff` is not a metallic map, whatever else lies in the folder), and so is a word that most
+//! end with: the name of the workflow. Words about size and format are dropped. The longest run of the
+//! remaining words that names a role, furthest to the right, decides. Single letters count only as the last
+//! word, as in Unreal's suffixes.
 //! Limits: a file whose name follows no convention is not used; `material.toml` can name the files instead.
 
 /// The role of a map.
@@ -32,7 +34,8 @@ pub enum Role {
     CoatRoughness,
     /// Surface normals, of either handedness.
     Normal,
-    /// A part of the appearance that ink on paper cannot show: sheen, light from within, transmission and the like.
+    /// A part of the appearance that ink on paper cannot show: sheen, light from within, transmission and
+    /// the like.
     Unprintable,
     /// A map that is known not to describe reflectance: occlusion, height, a preview and the like.
     Ignored,
@@ -59,7 +62,7 @@ impl Role {
 }
 
 /// Words, joined, that name a role.
-const ALIASES: [(&str, Role); 90] = [
+const ALIASES: [(&str, Role); 100] = [
     ("basecolor", Role::BaseColor),
     ("basecolour", Role::BaseColor),
     ("base", Role::BaseColor),
@@ -89,6 +92,14 @@ const ALIASES: [(&str, Role); 90] = [
     ("aorm", Role::Packed),
     ("aormt", Role::Packed),
     ("mr", Role::Packed),
+    ("rma", Role::Packed),
+    ("mra", Role::Packed),
+    ("mrao", Role::Packed),
+    ("mro", Role::Packed),
+    ("rom", Role::Packed),
+    ("ram", Role::Packed),
+    ("hrm", Role::Packed),
+    ("ordp", Role::Packed),
     ("metallicroughness", Role::Packed),
     ("metalnessroughness", Role::Packed),
     ("metalrough", Role::Packed),
@@ -132,6 +143,8 @@ const ALIASES: [(&str, Role); 90] = [
     ("nor", Role::Normal),
     ("nrm", Role::Normal),
     ("nrml", Role::Normal),
+    ("ddn", Role::Normal),
+    ("ddna", Role::Normal),
     ("ao", Role::Ignored),
     ("occlusion", Role::Ignored),
     ("ambientocclusion", Role::Ignored),
@@ -152,7 +165,8 @@ const ALIASES: [(&str, Role); 90] = [
     ("thumb", Role::Ignored),
 ];
 
-/// Words for parts of the appearance that ink cannot show. What follows one belongs to it: `sheen_color` is no base colour.
+/// Words for parts of the appearance that ink cannot show. What follows one belongs to it: `sheen_color` is
+/// no base colour.
 const UNPRINTABLE: [&str; 16] = [
     "sheen",
     "fuzz",
@@ -182,6 +196,38 @@ const LETTERS: [(&str, Role); 8] = [
     ("n", Role::Normal),
     ("h", Role::Ignored),
 ];
+
+/// Channels of roughness and of metallic in packed maps whose letters say another order than occlusion,
+/// roughness, metallic.
+const PACKINGS: [(&str, usize, Option<usize>); 8] = [
+    ("rma", 0, Some(1)),
+    ("mra", 1, Some(0)),
+    ("mrao", 1, Some(0)),
+    ("mro", 1, Some(0)),
+    ("rom", 0, Some(2)),
+    ("ram", 0, Some(2)),
+    ("hrm", 1, Some(2)),
+    // Occlusion, roughness, displacement.
+    ("ordp", 1, None),
+];
+
+/// The channels of roughness and of metallic in the packed map of this name.
+pub fn packing(name: &str) -> (usize, Option<usize>) {
+    let words = joined(&words(stem(name)));
+    let found = words.iter().rev().find_map(|word| PACKINGS.iter().find(|(letters, ..)| letters == word));
+    found.map_or((1, Some(2)), |&(_, roughness, metallic)| (roughness, metallic))
+}
+
+/// Whether the name of a normal map says that its alpha is glossiness.
+pub fn has_gloss(name: &str) -> bool {
+    words(stem(name)).iter().any(|word| word == "ddna")
+}
+
+/// Words, with those that an inner capital has divided put together again: `ORDp` is one.
+fn joined(words: &[String]) -> Vec<String> {
+    let pairs = words.windows(2).map(|pair| pair.concat());
+    words.iter().cloned().chain(pairs).collect()
+}
 
 /// The words of a stem, lower case.
 fn words(stem: &str) -> Vec<String> {
@@ -252,6 +298,16 @@ pub fn stem(name: &str) -> &str {
     name.rsplit_once('.').map_or(name, |(stem, _)| stem)
 }
 
+/// Whether a file is a picture that is read, by its name.
+pub fn is_picture(name: &str) -> bool {
+    has_extension(name, &["png", "jpg", "jpeg", "tif", "tiff", "exr", "hdr", "rgbe", "tga", "webp", "bmp"])
+}
+
+/// Whether a name has one of these endings.
+pub fn has_extension(name: &str, kinds: &[&str]) -> bool {
+    name.rsplit_once('.').is_some_and(|(_, kind)| kinds.iter().any(|known| kind.eq_ignore_ascii_case(known)))
+}
+
 /// The role that the last word of a file's name tells by itself.
 pub fn alone(name: &str) -> Option<Role> {
     let words = words(stem(name));
@@ -269,9 +325,31 @@ fn beginning(all: &[Vec<String>]) -> &[String] {
     starts.filter(is_shared).max_by_key(|start| start.len()).unwrap_or_default()
 }
 
+/// The word that more than half of the files end with, if each of these has a role without it: the name of
+/// a workflow, such as that of `_COL_METALNESS` and `_ROUGHNESS_METALNESS`.
+fn ending(all: &[Vec<String>]) -> Option<String> {
+    /// Source: two may end alike by chance, such as `coat_roughness` and `sheen_roughness`.
+    const FEW: usize = 3;
+    let last = |words: &[String]| words.iter().rposition(|word| !is_noise(word));
+    let shared = |word: &String| {
+        let ends = all.iter().filter(|words| last(words).is_some_and(|at| words[at] == *word));
+        let rests: Vec<Option<Role>> = ends.map(|words| role(&words[..last(words).unwrap_or(0)])).collect();
+        rests.len() >= FEW && 2 * rests.len() > all.len() && rests.iter().all(Option::is_some)
+    };
+    all.iter().filter_map(|words| last(words).map(|at| &words[at])).find(|word| shared(word)).cloned()
+}
+
 /// The role of each file of a folder, by its stem; `None` if the name tells nothing.
 pub fn roles(stems: &[&str]) -> Vec<Option<Role>> {
-    let all: Vec<Vec<String>> = stems.iter().map(|stem| words(stem)).collect();
+    let mut all: Vec<Vec<String>> = stems.iter().map(|stem| words(stem)).collect();
+    if let Some(workflow) = ending(&all) {
+        for words in &mut all {
+            let last = words.iter().rposition(|word| !is_noise(word));
+            if last.is_some_and(|at| words[at] == workflow) {
+                words.truncate(last.unwrap_or(0));
+            }
+        }
+    }
     let start = beginning(&all);
     all.iter()
         .map(|words| {
@@ -293,13 +371,31 @@ mod tests {
     #[expect(clippy::type_complexity, reason = "a table that is easy to read")]
     fn the_names_of_each_site_are_recognised() {
         use Role::*;
-        let sites: [(&str, &[(&str, Option<Role>)]); 11] = [
+        let sites: [(&str, &[(&str, Option<Role>)]); 13] = [
             (
                 "Fab",
                 &[
                     ("T_tdbkabgs_2K_B", Some(BaseColor)),
                     ("T_tdbkabgs_2K_N", Some(Normal)),
                     ("T_tdbkabgs_2K_ORM", Some(Packed)),
+                ],
+            ),
+            (
+                "other orders",
+                &[
+                    ("T_Thing_RMA", Some(Packed)),
+                    ("thing_hrm_2k", Some(Packed)),
+                    ("Thing_ORDp", Some(Packed)),
+                    ("T_Thing_BC", Some(BaseColor)),
+                ],
+            ),
+            (
+                "Poliigon",
+                &[
+                    ("Thing_COL_2K_METALNESS", Some(BaseColor)),
+                    ("Thing_ROUGHNESS_2K_METALNESS", Some(Roughness)),
+                    ("Thing_METALNESS_2K_METALNESS", Some(Metallic)),
+                    ("Thing_NRM_2K_METALNESS", Some(Normal)),
                 ],
             ),
             (

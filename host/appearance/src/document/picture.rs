@@ -3,18 +3,20 @@
 //! The contents of a file decide its format; a name that disagrees gives a note. Targa has no signature: its name decides. Dimensions are checked before anything of
 //! that size is allocated. Floating-point images must be finite.
 
+pub(super) mod primaries;
+
 use maths::Maths;
 use std::path::Path;
 
 use rayon::prelude::*;
-use readers::{Bounds, Fault, Format, Samples, Stored};
+use readers::{Bounds, Fault, Format, Primaries, Samples, Stored};
 
 use super::content::ColourSpace;
 use super::error::DocumentError;
-use super::primaries::to_rec_709;
 use super::source::Source;
 use super::texture::Plane;
 use crate::srgb;
+use primaries::to_rec_709;
 
 /// The most pixels of a document, as memory must hold them: the largest page has 38 million dots, and no
 /// known document has more.
@@ -242,6 +244,14 @@ impl Picture {
             Encoding::Linear => plane,
             encoding => plane.map(|v| encoding.linear(v)),
         }
+    }
+
+    /// The same with the primaries that a document states, whatever the file says.
+    pub fn with_primaries(mut self, primaries: Option<&Primaries>) -> Picture {
+        if let Some(stated) = primaries {
+            self.matrix = to_rec_709(stated).ok().flatten();
+        }
+        self
     }
 
     /// The colours as linear values of Rec. 709.

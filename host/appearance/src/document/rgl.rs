@@ -9,6 +9,8 @@
 //! Spectra become RGB as in [`super::spectrum`].
 //! Cost: about a million lookups. Limits: isotropic files only (phi_i of at most two entries).
 
+mod tensor;
+
 use maths::Maths;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
@@ -20,8 +22,8 @@ use super::curve;
 use super::error::DocumentError;
 use super::source::Source;
 use super::spectrum;
-use super::tensor::{Tensor, TensorFile};
 use crate::brdf::Space;
+use tensor::{Tensor, TensorFile};
 
 /// Samples of theta_h in the curve, on the square-root grid, as many as in MERL's files.
 const THETA_H: usize = 90;

@@ -1,13 +1,15 @@
 //! Bounded reading of a shelf's files, with a fingerprint of everything read and notes for the user.
 
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
-use files::shelf::{Kind, Shelf};
+use files::shelf::{Kind, Opened, Shelf};
 use sha2::{Digest, Sha256};
 
 use super::archive::Archive;
-use super::content::name_of;
-use super::error::DocumentError;
+use super::content::{MOST_BYTES, name_of};
+use super::error::{DocumentError, list};
+use super::names::is_picture;
 use observe::Observer;
 
 /// The most bytes in a settings file: far more than anybody writes, few enough for hostile ones.
@@ -24,6 +26,9 @@ pub struct Source<'a> {
     pub notes: Vec<String>,
     hash: Sha256,
     shelf: &'a dyn Shelf,
+    /// Files that were read, and whether pictures beside them that were not are told.
+    read: Vec<PathBuf>,
+    tells_unread: bool,
     /// The archive that is read in place of the shelf.
     archive: Option<Archive>,
 }
@@ -31,7 +36,15 @@ pub struct Source<'a> {
 impl<'a> Source<'a> {
     /// A source from which nothing has been read yet.
     pub fn new(shelf: &'a dyn Shelf, observer: &'a dyn Observer) -> Source<'a> {
-        Source { observer, notes: Vec::new(), hash: Sha256::new(), shelf, archive: None }
+        Source {
+            observer,
+            notes: Vec::new(),
+            hash: Sha256::new(),
+            shelf,
+            read: Vec::new(),
+            tells_unread: false,
+            archive: None,
+        }
     }
 
     /// Where its files stand.
@@ -50,7 +63,16 @@ impl<'a> Source<'a> {
     /// Reads what is inside of a zip archive from now on, under the path of the archive, and nothing else.
     pub fn mount(&mut self, path: &Path) -> Result<(), DocumentError> {
         let opened = self.shelf.open(path).map_err(files::io(path, "open"))?;
-        self.archive = Some(Archive::open(path, opened)?);
+        let archive = Archive::open(path, opened)?;
+        let inner = match archive.only_archive() {
+            None => archive,
+            Some(inner) => {
+                self.note(format!("{}: {} in it is read", path.display(), inner.display()));
+                let bytes = archive.read(&path.join(inner), MOST_BYTES)?;
+                Archive::open(path, Opened::memory(bytes))?
+            }
+        };
+        self.archive = Some(inner);
         Ok(())
     }
 
@@ -84,6 +106,7 @@ impl<'a> Source<'a> {
         let bytes = self.shelf().read(path, most)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         self.take_in(&name, &bytes);
+        self.read.push(path.to_path_buf());
         Ok(bytes)
     }
 
@@ -105,8 +128,33 @@ impl<'a> Source<'a> {
         self.hash.update(bytes);
     }
 
+    /// At the end, says which pictures lie beside those that were read.
+    pub fn tell_unread(&mut self) {
+        self.tells_unread = true;
+    }
+
+    /// Notes pictures that a document does not name, in the folders of what it does.
+    fn note_unread(&mut self) {
+        let folders: BTreeSet<&Path> = self.read.iter().filter_map(|path| path.parent()).collect();
+        let beside = folders.into_iter().flat_map(|folder| {
+            let names = self.list(folder).unwrap_or_default().into_iter();
+            let pictures = names
+                .filter(|(name, kind)| *kind != Kind::Folder && is_picture(name) && !name.starts_with('.'));
+            pictures.map(|(name, _)| folder.join(name))
+        });
+        let unread = beside.filter(|path| !self.read.contains(path));
+        let unread: Vec<String> =
+            unread.map(|path| path.file_name().unwrap_or_default().to_string_lossy().into_owned()).collect();
+        if !unread.is_empty() {
+            self.note(format!("not used, because the document does not name them: {}", list(&unread)));
+        }
+    }
+
     /// Returns the notes and the fingerprint.
-    pub fn finish(self) -> (Vec<String>, String) {
+    pub fn finish(mut self) -> (Vec<String>, String) {
+        if self.tells_unread {
+            self.note_unread();
+        }
         let digest = self.hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
         (self.notes, digest)
     }

@@ -6,6 +6,8 @@
 //! value: dark colours and small variances need the finer steps.
 //! Cost: 1, 2 or 4 bytes a pixel, and one look-up a value.
 
+pub(super) mod layers;
+
 use maths::Maths;
 use rayon::prelude::*;
 
@@ -234,6 +236,14 @@ impl Field {
             Field::Constant(value) => Field::Constant(value * factor),
             Field::Map(plane) if factor == 1.0 => Field::Map(plane),
             Field::Map(plane) => Field::Map(plane.map(|v| v * factor)),
+        }
+    }
+
+    /// One minus it: roughness from smoothness.
+    pub fn inverted(self) -> Field {
+        match self {
+            Field::Map(plane) => Field::Map(plane.map(|v| 1.0 - v)),
+            Field::Constant(value) => Field::Constant(1.0 - value),
         }
     }
 

@@ -29,8 +29,8 @@ use observe::Observer;
 /// What to read.
 #[derive(Args, Debug)]
 pub struct DocumentArgs {
-    /// Document: a folder of texture maps or its .zip, a .gltf, .glb or .mtlx file, a measured BRDF (.binary, .bsdf, .brdf, .csv), a
-    /// .foil folder, or sample:NAME
+    /// Document: a folder of texture maps or its .zip, a .gltf, .glb, .mtlx, .usda, .usdz or .mtl file, a measured BRDF (.binary,
+    /// .bsdf, .brdf, .csv), a .foil folder, or sample:NAME
     #[arg(
         value_name = "DOC",
         value_parser = utf8(),

@@ -6,7 +6,7 @@ use ::files::shelf::Kind;
 
 use super::settings::{FolderSettings, SETTINGS};
 use crate::document::error::{DocumentError, list};
-use crate::document::names::{self, Role, stem};
+use crate::document::names::{self, Role, has_extension, is_picture, stem};
 use crate::document::source::Source;
 
 /// The files of a folder by role, and all image files for error messages.
@@ -14,6 +14,8 @@ pub(super) struct Files {
     pub(super) folder: PathBuf,
     seen: Vec<String>,
     pub(super) by_role: Vec<(Role, String)>,
+    /// The channel of a map that the settings name.
+    channels: Vec<(Role, usize)>,
 }
 
 impl Files {
@@ -36,8 +38,18 @@ impl Files {
         let all: Vec<&String> = seen.iter().chain(&foreign).collect();
         let stems: Vec<&str> = all.iter().map(|name| stem(name)).collect();
         let roles = names::roles(&stems);
-        let mut files = Files { folder: folder.to_path_buf(), seen: seen.clone(), by_role: Vec::new() };
-        for (role, name) in settings.maps.named() {
+        let mut files = Files {
+            folder: folder.to_path_buf(),
+            seen: seen.clone(),
+            by_role: Vec::new(),
+            channels: Vec::new(),
+        };
+        for (role, named) in settings.maps.named() {
+            let (name, channel) = channel_of(named, role).map_err(|problem| DocumentError::Settings {
+                path: folder.join(SETTINGS),
+                problem: format!("maps: {problem}"),
+            })?;
+            files.channels.extend(channel.map(|channel| (role, channel)));
             if Path::new(name).components().count() != 1 || name.contains(['/', '\\']) || name == ".." {
                 return Err(DocumentError::Settings {
                     path: folder.join(SETTINGS),
@@ -53,7 +65,8 @@ impl Files {
                 files.by_role.push((role, name.clone()));
             }
         }
-        let named = |name: &str| settings.maps.named().any(|(_, named)| named == name);
+        let own = |named| channel_of(named, Role::Roughness).map_or(named, |(name, _)| name);
+        let named = |name: &str| settings.maps.named().any(|(_, named)| own(named) == name);
         let unused = |role: &Option<Role>| matches!(role, None | Some(Role::Ignored));
         let unused: Vec<String> = seen
             .iter()
@@ -128,6 +141,11 @@ impl Files {
         self.by_role.iter().filter(|(r, _)| *r == role).map(|(_, name)| name.clone()).collect()
     }
 
+    /// The channel that the settings name for a role.
+    pub(super) fn channel(&self, role: Role) -> Option<usize> {
+        self.channels.iter().find(|(own, _)| *own == role).map(|(_, channel)| *channel)
+    }
+
     pub(super) fn error(&self, problem: String) -> DocumentError {
         DocumentError::Maps { folder: self.folder.clone(), problem, seen: self.seen.clone() }
     }
@@ -146,15 +164,25 @@ impl Files {
     }
 }
 
+/// The name of a file, and the channel that follows it behind a colon, as in `T_Thing_RMA.png:r`.
+fn channel_of(named: &str, role: Role) -> Result<(&str, Option<usize>), String> {
+    let Some((name, letter)) = named.rsplit_once(':') else { return Ok((named, None)) };
+    let Some(channel) = ["r", "g", "b", "a"].iter().position(|known| *known == letter) else {
+        return Err(format!("`{named}`: `{letter}` is no channel; expected one of r, g, b, a"));
+    };
+    match role {
+        Role::Roughness | Role::Metallic | Role::Glossiness | Role::Coat | Role::CoatRoughness => {
+            Ok((name, Some(channel)))
+        }
+        other => Err(format!("`{named}`: the {} map has all channels of its file", other.name())),
+    }
+}
+
 /// Whether these names of files hold a base colour map.
 pub(super) fn has_base_colour<'n>(names: impl Iterator<Item = &'n str>) -> bool {
     let stems: Vec<&str> =
         names.filter(|name| is_picture(name) && !name.starts_with('.')).map(stem).collect();
     names::roles(&stems).contains(&Some(Role::BaseColor))
-}
-
-fn is_picture(name: &str) -> bool {
-    has_extension(name, &["png", "jpg", "jpeg", "tif", "tiff", "exr", "hdr", "rgbe", "tga", "webp", "bmp"])
 }
 
 /// Whether a file is, by its name, an image that cannot be decoded here.
@@ -163,8 +191,4 @@ fn is_foreign_picture(name: &str) -> bool {
         name,
         &["gif", "dds", "psd", "ktx2", "ktx", "avif", "heic", "jxl", "jp2", "svg", "tx", "pic"],
     )
-}
-
-fn has_extension(name: &str, kinds: &[&str]) -> bool {
-    name.rsplit_once('.').is_some_and(|(_, kind)| kinds.contains(&kind.to_ascii_lowercase().as_str()))
 }

@@ -9,6 +9,7 @@ use crate::materials::{Materials, Surface, Surfaces};
 use observe::Silent;
 
 mod exports;
+mod scenes;
 
 struct Folder(tempfile::TempDir);
 

@@ -189,7 +189,8 @@ impl<'a> Loader<'a, '_> {
                 .map_err(|error| self.wrong(field, format!("{label}: the data URI is damaged: {error}")))?;
             return Ok((PathBuf::from(format!("{} {label}", self.path.display())), bytes));
         }
-        let file = percent_decode_str(uri).decode_utf8_lossy();
+        // Exporters on Windows write what their system has between folders.
+        let file = percent_decode_str(uri).decode_utf8_lossy().replace('\\', "/");
         let Some(path) = inside(self.path.parent().unwrap_or(Path::new("")), &file) else {
             return Err(self
                 .wrong(field, format!("{label}: `{uri}` must be a file in the document's folder or below")));

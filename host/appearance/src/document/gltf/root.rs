@@ -57,6 +57,22 @@ fn chunk<'a>(bytes: &'a [u8], kind: &str) -> Result<(&'a [u8], &'a [u8]), String
 /// # Errors
 /// What is wrong with it: the path of a field, and the problem.
 pub(super) fn parse(text: &[u8]) -> Result<Root, (String, String)> {
+    // glTF 1.0 has objects where 2.0 has lists, so it is looked at by itself.
+    #[derive(Deserialize)]
+    struct Versioned {
+        asset: Asset1,
+    }
+    #[derive(Deserialize)]
+    struct Asset1 {
+        version: String,
+    }
+    let versioned: Result<Versioned, _> = serde_json::from_slice(text);
+    if let Some(version) = versioned.ok().map(|found| found.asset.version).filter(|v| v.starts_with("1.")) {
+        return Err((
+            "asset.version".into(),
+            format!("it is glTF {version}; only 2.0 is read, and the program that made it exports that too"),
+        ));
+    }
     let mut reader = serde_json::Deserializer::from_slice(text);
     let root = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
         let path = error.path().to_string();

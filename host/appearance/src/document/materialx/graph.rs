@@ -2,16 +2,17 @@
 //!
 //! Method: connections are followed from the input to a picture, through graphs, conversions, single channels and factors.
 //! A file's name is put together from the prefixes of the elements around it, and must stay in the document's folder; its colour
-//! space is that of the nearest element that states one. Limits: nodes that compute anything else are errors, chains end after
+//! space is that of the nearest element that states one ([`Colours`]). Limits: nodes that compute anything else are errors, chains end after
 //! [`DEEPEST`] steps.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use files::shelf::inside;
 use roxmltree::Node;
 
+use crate::document::colours::{Colours, LINEAR};
 use crate::document::error::DocumentError;
-use crate::document::picture::Encoding;
+use crate::document::inputs::{Image, Value};
 
 /// The most nodes of the document's tree: far more than any graph of materials, few enough for hostile files.
 pub(super) const MOST_NODES: u32 = 200_000;
@@ -31,39 +32,6 @@ pub(super) enum Link<'d> {
     Value(Node<'d, 'd>),
     /// A node, and which of its outputs.
     Node(Node<'d, 'd>, Option<&'d str>),
-}
-
-/// What an input is in the end.
-#[derive(Debug)]
-pub(super) enum Value {
-    /// At least one number.
-    Numbers(Vec<f32>),
-    /// A picture.
-    Image(Image),
-}
-
-/// A picture that an input is connected to.
-#[derive(Debug)]
-pub(super) struct Image {
-    pub(super) file: PathBuf,
-    pub(super) encoding: Encoding,
-    /// The channel that is used; all of them if none.
-    pub(super) channel: Option<usize>,
-    /// What the values are multiplied by.
-    pub(super) factor: [f32; 3],
-    /// What was left out.
-    pub(super) note: Option<String>,
-}
-
-impl Image {
-    /// How its colours are read.
-    pub(super) fn words(&self) -> &'static str {
-        match self.encoding {
-            Encoding::Srgb => "sRGB",
-            Encoding::Linear => "linear",
-            Encoding::Power(_) => "a power of light",
-        }
-    }
 }
 
 /// The numbers of a value; `None` if it holds anything else.
@@ -136,8 +104,10 @@ impl<'d> Graph<'d, '_> {
                 let numbers = numbers(text)
                     .ok_or_else(|| self.wrong(&name, format!("expected numbers, found `{text}`")))?;
                 let encoded = of.attribute("type").is_some_and(|kind| kind.starts_with("color"));
-                let light = |v: f32| if encoded { self.encoding(&of, None).linear(v) } else { v };
-                return Ok(Value::Numbers(numbers.into_iter().map(light).collect()));
+                return Ok(Value::Numbers(match encoded {
+                    true => self.colours(&of, None)?.linear(&numbers),
+                    false => numbers,
+                }));
             }
         };
         let kind = node.tag_name().name();
@@ -215,6 +185,7 @@ impl<'d> Graph<'d, '_> {
         // The outermost prefix comes first.
         let prefixes: Vec<&str> = file.ancestors().filter_map(|node| node.attribute("fileprefix")).collect();
         let name: String = prefixes.into_iter().rev().chain([value]).collect();
+        let name = name.replace('\\', "/");
         if name.contains(['<', '{']) {
             return Err(self.wrong(place, format!("`{name}` stands for several files; name one of them")));
         }
@@ -232,18 +203,15 @@ impl<'d> Graph<'d, '_> {
             format!("{place}: the picture is printed once, as it is stored; its placement is ignored")
         });
         let stated = input(node, "sourceColorSpace").and_then(|input| input.attribute("value"));
-        let encoding = self.encoding(&file, stated);
-        Ok(Image { file: path, encoding, channel: None, factor: [1.0; 3], note })
+        let colours = self.colours(&file, stated)?;
+        Ok(Image { file: path, colours, channel: None, factor: [1.0; 3], note })
     }
 
     /// The colour space that holds for a value: its own, or that of the nearest element around it.
-    fn encoding(&self, value: &Node<'d, 'd>, stated: Option<&str>) -> Encoding {
+    fn colours(&self, value: &Node<'d, 'd>, stated: Option<&str>) -> Result<Colours, DocumentError> {
         let around = || value.ancestors().find_map(|node| node.attribute("colorspace"));
-        match stated.or_else(around) {
-            Some("srgb_texture" | "sRGB" | "srgb" | "auto") => Encoding::Srgb,
-            Some("g22_rec709" | "gamma22") => Encoding::Power(1.0 / 2.2),
-            Some("g18_rec709" | "gamma18") => Encoding::Power(1.0 / 1.8),
-            _ => Encoding::Linear,
-        }
+        let Some(name) = stated.or_else(around).filter(|name| !name.is_empty()) else { return Ok(LINEAR) };
+        let line = value.document().text_pos_at(value.range().start).row;
+        Colours::named(name).map_err(|problem| self.wrong(&format!("colorspace in line {line}"), problem))
     }
 }

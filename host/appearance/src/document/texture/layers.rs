@@ -1,20 +1,21 @@
 //! The parameters of a material of a scene, and the surfaces that they make.
 //!
 //! Problem: glTF and MaterialX give each parameter as a number or as a picture of its own size.
-//! Method: a field for each parameter; all maps are resized to the base colour, or else to the largest map. Cost: what resizing costs.
+//! Method: a field for each parameter; all maps are resized to the base colour, or else to the largest map.
+//! Cost: what resizing costs.
 //! Limits: maps whose shapes differ by more than 1 % are refused.
 
 use std::path::Path;
 
-use super::error::DocumentError;
-use super::relief;
-use super::source::Source;
-use super::texture::{Field, same_shape};
+use super::{Field, same_shape};
 use crate::brdf::Space;
+use crate::document::error::DocumentError;
+use crate::document::relief;
+use crate::document::source::Source;
 use crate::materials::{Coat, Surfaces, metallic, specular};
 
 /// The parameters of a material, each a map or a constant.
-pub(super) struct Layers {
+pub struct Layers {
     pub base: [Field; 3],
     pub kind: PbrWorkflow,
     /// Slope variance of the normal map, at the size of that map.
@@ -24,7 +25,7 @@ pub(super) struct Layers {
 }
 
 /// A clear coat.
-pub(super) struct CoatLayer {
+pub struct CoatLayer {
     /// The part of the surface that it covers.
     pub weight: Field,
     /// Its roughness.
@@ -41,16 +42,16 @@ impl CoatLayer {
 }
 
 /// How base and reflectance belong together.
-pub(super) enum PbrWorkflow {
+pub enum PbrWorkflow {
     /// Base colour, roughness and metallic, with the reflectance of what is no metal and a factor on it.
     Metallic { roughness: Field, metal: Field, f0: [Field; 3], level: Field },
     /// Diffuse and specular colour, and glossiness.
     Specular { f0: [Field; 3], gloss: Field },
 }
 
-/// Resizes all maps to the base colour, or else to the largest map, and builds the surfaces. Also returns whether there was
-/// any map.
-pub(super) fn build(
+/// Resizes all maps to the base colour, or else to the largest map, and builds the surfaces. Also returns
+/// whether there was any map.
+pub fn build(
     layers: Layers,
     path: &Path,
     space: Space,

@@ -1,13 +1,13 @@
 //! The tensor file: named arrays of numbers after one header.
 //!
-//! Layout (little-endian): `tensor_file\0`, two version bytes 1 and 0, u32 number of fields; for each field, u16 length and
-//! text of the name, u16 number of dimensions, u8 type, u64 offset from the start of the file, then u64 per dimension.
-//! Types: 1 u8, 2 i8, 3 u16, 4 i16, 5 u32, 6 i32, 7 u64, 8 i64, 9 f16, 10 f32, 11 f64. Every offset and shape is
-//! checked against the file before a value is read.
+//! Layout (little-endian): `tensor_file\0`, two version bytes 1 and 0, u32 number of fields; for each
+//! field, u16 length and text of the name, u16 number of dimensions, u8 type, u64 offset from the start of
+//! the file, then u64 per dimension. Types: 1 u8, 2 i8, 3 u16, 4 i16, 5 u32, 6 i32, 7 u64, 8 i64, 9 f16, 10
+//! f32, 11 f64. Every offset and shape is checked against the file before a value is read.
 
 use std::path::{Path, PathBuf};
 
-use super::error::DocumentError;
+use crate::document::error::DocumentError;
 
 /// The most fields in a file: published ones have some ten; few enough for hostile files.
 const MOST_FIELDS: u32 = 256;

@@ -1,10 +1,10 @@
 //! Colours of other primaries as amounts of red, green and blue of Rec. 709.
 //!
-//! Problem: an OpenEXR file may state the chromaticities of its colours, such as those of ACES; read as Rec. 709 its colours are
-//! pale.
-//! Method: chromaticities and white give the matrix to XYZ (SMPTE RP 177); Bradford's matrix adapts the file's white to D65; the inverse
-//! of Rec. 709's own matrix follows. Cost: nine products a pixel. Limits: colours outside of Rec. 709 become negative,
-//! and the caller clamps them.
+//! Problem: an OpenEXR file may state the chromaticities of its colours, such as those of ACES; read as
+//! Rec. 709 its colours are pale.
+//! Method: chromaticities and white give the matrix to XYZ (SMPTE RP 177); Bradford's matrix adapts the
+//! file's white to D65; the inverse of Rec. 709's own matrix follows. Cost: nine products a pixel. Limits:
+//! colours outside of Rec. 709 become negative, and the caller clamps them.
 //! Source: SMPTE RP 177-1993; ICC.1:2022, annex E (Bradford).
 
 use readers::Primaries;
@@ -17,10 +17,10 @@ const REC_709: Primaries = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], [0.3127, 0
 /// The response of the cones, after Bradford.
 const CONES: Matrix = [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]];
 
-/// The matrix from linear amounts of these primaries to linear Rec. 709; `None` if they are the same within what files round to.
+/// The matrix from linear amounts of these primaries to linear Rec. 709; `None` if they are the same within
+/// what files round to.
 ///
-/// # Errors
-/// Primaries that do not span colours.
+/// # Errors Primaries that do not span colours.
 pub fn to_rec_709(primaries: &Primaries) -> Result<Option<Matrix>, String> {
     // Programs write them with three or four digits, so that equal ones differ by so much.
     const ALIKE: f32 = 0.001;
@@ -70,7 +70,8 @@ fn product(a: &Matrix, b: &Matrix) -> Matrix {
 
 /// The inverse by cofactors; `None` if there is none.
 fn inverse(m: &Matrix) -> Option<Matrix> {
-    // Chromaticities have 24 bits: what is on a line is so up to this, and all known primaries span more than 0.1.
+    // Chromaticities have 24 bits: what is on a line is so up to this, and all known primaries span more
+    // than 0.1.
     const FLAT: f64 = 1e-6;
     let cofactor = |row: usize, c: usize| {
         let at = |i: usize, j: usize| m[(row + i) % 3][(c + j) % 3];
