@@ -323,7 +323,10 @@ mod tests {
             let widths = Widths::new(&space, &alphas);
             let near = widths.nearest(&row).unwrap();
             let found = space.distance(&row, &widths.row(&near));
-            prop_assert!(found <= 1.2 * best + 0.002, "{found} {best}");
+            // The linearised metric chooses, which for what no one lobe is near to is not the metric.
+            prop_assert!(found <= 1.5 * best + 0.002, "{found} {best}");
+            let one = widths.nearest(&rows[0]).unwrap();
+            prop_assert!(space.distance(&rows[0], &widths.row(&one)) <= 0.004, "{one:?}");
         }
     }
 
