@@ -14,7 +14,7 @@ use super::error::DocumentError;
 use super::picture::Picture;
 use super::relief;
 use super::source::Source;
-use super::texture::Field;
+use super::texture::{Field, Plane};
 
 /// What is said of colours that no mixture of red, green and blue is.
 const OUTSIDE: &str = "colours outside of Rec. 709 are clamped to it";
@@ -37,8 +37,20 @@ pub(super) struct Image {
     pub channel: Option<usize>,
     /// What the values are multiplied by.
     pub factor: [f32; 3],
+    /// What is added then.
+    pub bias: [f32; 3],
     /// What was left out.
     pub note: Option<String>,
+}
+
+impl Image {
+    /// A map of its values, with the factor and what is added of a channel.
+    fn scaled(&self, plane: Plane, channel: usize) -> Field {
+        match (self.factor[channel], self.bias[channel]) {
+            (factor, 0.0) => Field::Map(plane).times(factor),
+            (factor, bias) => Field::Map(plane.map(|v| (v * factor + bias).max(0.0))),
+        }
+    }
 }
 
 /// Reads what parameters are set to.
@@ -81,7 +93,7 @@ impl Inputs<'_, '_> {
                 if plane.outside().is_some() {
                     return Err(self.wrong(name, format!("{}: values are 0 to 1", image.file.display())));
                 }
-                Field::Map(plane).times(image.factor[0])
+                image.scaled(plane, 0)
             }
         })
     }
@@ -110,13 +122,15 @@ impl Inputs<'_, '_> {
                     self.source.note(format!("{file}: {OUTSIDE}"));
                     planes = planes.map(|plane| plane.map(|v| v.max(0.0)));
                 }
-                let mut factors = image.factor.into_iter();
                 match image.channel {
                     Some(channel) => {
                         let plane = &planes[channel.min(2)];
-                        std::array::from_fn(|c| Field::Map(plane.clone()).times(image.factor[c]))
+                        std::array::from_fn(|c| image.scaled(plane.clone(), c))
                     }
-                    None => planes.map(|plane| Field::Map(plane).times(factors.next().unwrap_or(1.0))),
+                    None => {
+                        let [r, g, b] = planes;
+                        [image.scaled(r, 0), image.scaled(g, 1), image.scaled(b, 2)]
+                    }
                 }
             }
         })

@@ -181,7 +181,7 @@ impl Reader<'_, '_, '_> {
             let problem = format!("{word}: `{rest}` must be a file in the document's folder or below");
             return Err(self.inputs.wrong(&field, problem));
         };
-        Ok(Some(Image { file, colours, channel: None, factor: [1.0; 3], note: None }))
+        Ok(Some(Image { file, colours, channel: None, factor: [1.0; 3], bias: [0.0; 3], note: None }))
     }
 
     /// A parameter: its picture, or its number.

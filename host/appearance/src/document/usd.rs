@@ -253,11 +253,12 @@ impl<'t> Scene<'t> {
             _ => None,
         };
         let scale = numbers("inputs:scale").unwrap_or_else(|| vec![1.0]);
-        let of = |c: usize| *scale.get(c).unwrap_or(&scale[0]);
-        let factor = channel.map_or_else(|| std::array::from_fn(of), |channel| [of(channel); 3]);
-        let bias = numbers("inputs:bias").filter(|bias| bias.iter().take(3).any(|&v| v != 0.0));
-        let note = bias.map(|_| format!("{}: its bias is not read", texture.name));
-        Ok(Image { file: path, colours, channel, factor, note })
+        let bias = numbers("inputs:bias").unwrap_or_else(|| vec![0.0]);
+        let of = |numbers: &[f32]| {
+            let at = |c: usize| *numbers.get(c).or(numbers.first()).unwrap_or(&0.0);
+            channel.map_or_else(|| std::array::from_fn(at), |channel| [at(channel); 3])
+        };
+        Ok(Image { file: path, colours, channel, factor: of(&scale), bias: of(&bias), note: None })
     }
 }
 
@@ -313,7 +314,9 @@ impl Reader<'_, '_, '_> {
         };
         let normal = match self.value("normal")? {
             // What scales normals to -1 to 1 is no factor on their slopes.
-            Some(Value::Image(image)) => Some(Value::Image(Image { factor: [1.0; 3], note: None, ..image })),
+            Some(Value::Image(image)) => {
+                Some(Value::Image(Image { factor: [1.0; 3], bias: [0.0; 3], ..image }))
+            }
             other => other,
         };
         let variance = self.inputs.normal("normal", normal, base[0].size())?;

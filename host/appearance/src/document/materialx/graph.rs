@@ -204,7 +204,7 @@ impl<'d> Graph<'d, '_> {
         });
         let stated = input(node, "sourceColorSpace").and_then(|input| input.attribute("value"));
         let colours = self.colours(&file, stated)?;
-        Ok(Image { file: path, colours, channel: None, factor: [1.0; 3], note })
+        Ok(Image { file: path, colours, channel: None, factor: [1.0; 3], bias: [0.0; 3], note })
     }
 
     /// The colour space that holds for a value: its own, or that of the nearest element around it.

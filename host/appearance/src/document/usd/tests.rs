@@ -96,6 +96,20 @@ fn numbers_and_pictures_behind_textures_are_read() {
 }
 
 #[test]
+fn what_is_added_to_a_texture_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("maps")).unwrap();
+    png(&folder.path().join("maps/arm.png"), [1, 102, 204]);
+    let text = scene("float inputs:roughness.connect = </Root/Looks/Gold/Data.outputs:g>").replace(
+        "inputs:scale = (1, 0.5, 1, 1)",
+        "inputs:scale = (1, 0.5, 1, 1)\nfloat4 inputs:bias = (0, 0.25, 0, 0)",
+    );
+    let (surfaces, _) = read(folder.path(), &text, None).unwrap();
+    // 102 of 255, halved, and a quarter.
+    close(surfaces.surface(0), metallic([0.18; 3], [0.04; 3], 0.45, 0.0));
+}
+
+#[test]
 fn wrong_files_are_errors_with_their_line_or_field() {
     let folder = tempfile::tempdir().unwrap();
     let fails = |text: &str, says: &[&str]| {
