@@ -1,15 +1,18 @@
-//! Specular gloss at 20, 60 and 85 degrees, as a gloss meter reads it, and the width of a lobe from such readings.
+//! Specular gloss at 20, 60 and 85 degrees, as a gloss meter reads it, and the width of a lobe from such
+//! readings.
 //!
-//! Problem: owners have gloss meters, not gonioreflectometers, and want to compare their readings with curves.
-//! Method: the light of each lobe that passes the window of the meter (ISO 2813: 4.4 degrees in the plane of incidence and 11.7 across
-//! it at 60 degrees, 1.8 and 3.6 at 20, 4.0 and 6.0 at 85), relative to polished black glass of index 1.567, which reads 100. Each lobe is
-//! evaluated as a full microfacet BRDF with Smith's shadowing; reflectance rises at 60 degrees by Fresnel's equations for a
-//! dielectric surface and by Schlick's form for metal. The width is searched on a grid and then by golden sections, for the least
-//! squares of the readings' relative errors.
-//! A curve reads by its integral and shape ([`of_curve`]).
-//! Cost: 4096 evaluations per lobe and angle; some hundred of those for a width. Limits: the beam is assumed to be parallel. [`units`] ignores
-//! the diffuse body, [`reading`] counts it. Because of the long tails of GGX, a lobe reads lower than its visible sharpness suggests, and
-//! readings at several angles disagree about its width: the disagreement is part of the answer.
+//! Problem: owners have gloss meters, not gonioreflectometers, and want to compare their readings with
+//! curves.
+//! Method: the light of each lobe that passes the window of the meter (ISO 2813: 4.4 degrees in the plane
+//! of incidence and 11.7 across it at 60 degrees, 1.8 and 3.6 at 20, 4.0 and 6.0 at 85), relative to
+//! polished black glass of index 1.567, which reads 100. Each lobe is evaluated as a full microfacet BRDF
+//! with Smith's shadowing; reflectance rises at 60 degrees by Fresnel's equations for a dielectric surface
+//! and by Schlick's form for metal. The width is searched on a grid and then by golden sections, for the
+//! least squares of the readings' relative errors. A curve reads by its integral and shape ([`of_curve`]).
+//! Cost: 4096 evaluations per lobe and angle; some hundred of those for a width. Limits: the beam is
+//! assumed to be parallel. [`units`] ignores the diffuse body, [`reading`] counts it. Because of the long
+//! tails of GGX, a lobe reads lower than its visible sharpness suggests, and readings at several angles
+//! disagree about its width: the disagreement is part of the answer.
 
 use maths::Maths;
 use std::f64::consts::PI;
@@ -21,7 +24,8 @@ use crate::lobes::{Lobe, Lobes};
 /// Index of the glass that reads 100.
 const GLASS: f64 = 1.567;
 const STEPS: usize = 64;
-/// The half angle beyond which a curve is looked at for its body: nearer, a lobe that is a little off hides it.
+/// The half angle beyond which a curve is looked at for its body: nearer, a lobe that is a little off hides
+/// it.
 const ASIDE: f64 = PI / 6.0;
 /// The largest half angle at which curves are trusted.
 const TRUSTED: f64 = 75.0 * PI / 180.0;
@@ -50,6 +54,19 @@ impl Geometry {
 /// A lobe above this is metal; dielectrics up to index 1.8 reflect less.
 const DIELECTRIC: f64 = 0.082;
 
+/// Units at 60 degrees below which a surface is matt, and above which it is glossy (ISO 2813).
+const SATIN: [f64; 2] = [10.0, 70.0];
+
+/// "matt", "satin" or "glossy", by units at 60 degrees.
+#[must_use]
+pub fn word(units: f64) -> &'static str {
+    match units {
+        at if at < SATIN[0] => "matt",
+        at if at < SATIN[1] => "satin",
+        _ => "glossy",
+    }
+}
+
 /// Unpolarised reflectance of a dielectric of index `n` at the angle with cosine `cos`.
 fn fresnel(n: f64, cos: f64) -> f64 {
     let inside = (1.0 - (1.0 - cos * cos) / (n * n)).sqrt();
@@ -77,7 +94,8 @@ fn lambda(cos: f64, alpha: f64) -> f64 {
     ((1.0 + alpha * alpha * (1.0 / (cos * cos) - 1.0)).sqrt() - 1.0) / 2.0
 }
 
-/// The integral of `f cos_o` over the window, where `f` gets the outgoing direction and the beam arrives in the plane y = 0.
+/// The integral of `f cos_o` over the window, where `f` gets the outgoing direction and the beam arrives in
+/// the plane y = 0.
 fn through_window(geometry: Geometry, f: impl Fn([f64; 3]) -> f64) -> f64 {
     let (sin_i, cos_i) = geometry.degrees.to_radians().sine_cosine();
     let half = geometry.window.map(f64::to_radians);
@@ -132,11 +150,12 @@ pub fn reading(geometry: Geometry, lobes: &Lobes) -> f64 {
     relative(geometry, diffuse + lobes.lobes.iter().map(|lobe| of_lobe(geometry, lobe)).sum::<f64>())
 }
 
-/// What a gloss meter reads at some angles on a surface of which only the curve over the half angle is known, light and eye in one place.
+/// What a gloss meter reads at some angles on a surface of which only the curve over the half angle is
+/// known, light and eye in one place.
 ///
-/// The curve is split into a body, which is what is left at its lowest, and a lobe above it, whose microfacets cover the unit disc
-/// once; so the lobe's F0 follows from its integral. Its shape stays that of the curve. Values beyond 75 degrees are not
-/// looked at, where measurements end or are noise.
+/// The curve is split into a body, which is what is left at its lowest, and a lobe above it, whose
+/// microfacets cover the unit disc once; so the lobe's F0 follows from its integral. Its shape stays that
+/// of the curve. Values beyond 75 degrees are not looked at, where measurements end or are noise.
 pub fn of_curve<const N: usize>(geometries: [Geometry; N], curve: &Curve) -> [f64; N] {
     let split = Split::of(curve, ASIDE);
     geometries.map(|geometry| split.reading(geometry, curve))
@@ -216,8 +235,8 @@ pub struct Width {
     pub misfit: f64,
 }
 
-/// The width of a surface's only lobe from readings in gloss units. `body` says what lies under a lobe of that width.
-/// `None` without readings, or if one is not positive.
+/// The width of a surface's only lobe from readings in gloss units. `body` says what lies under a lobe of
+/// that width. `None` without readings, or if one is not positive.
 pub fn width(readings: &[(Geometry, f64)], body: impl Fn(f64) -> Lobes) -> Option<Width> {
     if readings.is_empty() || readings.iter().any(|(_, read)| !(read.is_finite() && *read > 0.0)) {
         return None;
@@ -335,7 +354,8 @@ mod tests {
         }
     }
 
-    /// The curve of a lobe reads what the lobe reads, which other tests compare with Fresnel's equations and another program.
+    /// The curve of a lobe reads what the lobe reads, which other tests compare with Fresnel's equations
+    /// and another program.
     #[test]
     fn a_curve_reads_what_its_lobe_does() {
         let fine: Vec<f64> = (0..400).map(|i| PI / 2.0 * (f64::from(i) / 399.0).powi(2)).collect();
@@ -369,7 +389,8 @@ mod tests {
         }
     }
 
-    /// ISO 2813's standard: 100 at each angle, from a curve. Three times as bright a curve is no glass; a matt one reads its share.
+    /// ISO 2813's standard: 100 at each angle, from a curve. Three times as bright a curve is no glass; a
+    /// matt one reads its share.
     #[test]
     fn the_curve_of_polished_black_glass_reads_a_hundred() {
         let angles: Vec<f64> = (0..2000).map(|i| PI / 2.0 * (f64::from(i) / 1999.0).powi(5)).collect();
@@ -413,8 +434,8 @@ mod tests {
         assert!(found.uncertainty > 0.3 && (0.05..0.2).contains(&found.alpha), "{found:?}");
     }
 
-    /// Published with the model for F0 = 0.04 and for a metal of 0.85, in whole units. The model of the beam was not
-    /// published, hence the tolerance of 3 %.
+    /// Published with the model for F0 = 0.04 and for a metal of 0.85, in whole units. The model of the
+    /// beam was not published, hence the tolerance of 3 %.
     #[test]
     fn the_published_readings() {
         for (alpha, clear, metal) in [

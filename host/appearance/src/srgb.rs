@@ -1,8 +1,9 @@
-//! The transfer curve of sRGB (IEC 61966-2-1), in both directions.
+//! The transfer curve of sRGB (IEC 61966-2-1), in both directions, and the luminance of its colours.
 
 use maths::Maths;
 
-/// The linear value of an encoded one; both are 0 to 1 for displayable colours, and values below 0 count as 0.
+/// The linear value of an encoded one; both are 0 to 1 for displayable colours, and values below 0 count as
+/// 0.
 pub fn decode(v: f32) -> f32 {
     if v <= 0.04045 {
         v.max(0.0) * (1.0 / 12.92f64) as f32
@@ -21,6 +22,12 @@ pub fn encode(v: f32) -> f32 {
         // In `f32` these two numbers would make white a little less than 1.
         (f64::from(v.power((1.0 / 2.4f64) as f32)) * 1.055 - 0.055) as f32
     }
+}
+
+/// The luminance of a linear colour (ITU-R BT.709).
+#[must_use]
+pub fn luminance(rgb: [f64; 3]) -> f64 {
+    0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use appearance::brdf::reflectances;
 use appearance::document::Document;
 use appearance::factor::{FactorSettings, Factored};
 use appearance::gamut::{GamutSettings, InkMix, Printable};
-use appearance::views::luminance;
+use appearance::srgb::luminance;
 use halftone::metrics::{self, Look, Tone};
 use inks::{InkSet, Library};
 use maths::Maths;
@@ -23,6 +23,7 @@ use press::preview::gloss::{self, Gloss};
 use press::preview::{
     self, Contrasts, EYE, FidelityReport, Panels, Probe, STANDARD_LIGHTS, Source, Spectrum, Swatch, TILTS,
 };
+use protocol::ink::Ink;
 use rayon::prelude::*;
 use readers::Pixels;
 use serde_json::{Value, json};
@@ -61,13 +62,15 @@ pub struct Settings {
 pub const SEED: u64 = 1;
 
 impl Default for Settings {
-    /// The default inks of the built-in library, in the middle of A4.
+    /// The default inks of the built-in library but primer, whose ribbon can tear there, in the middle of
+    /// plain A4.
     fn default() -> Settings {
         Settings {
             dots: document::Settings {
                 factor: FactorSettings { seed: SEED, ..FactorSettings::default() },
                 gamut: GamutSettings { seed: SEED, ..GamutSettings::default() },
-                inks: InkSet::default(),
+                inks: InkSet::default().without(Ink::Primer),
+                held_back: InkSet::of([Ink::Primer]),
                 halftone: halftone::Method::default(),
                 size: None,
             },
@@ -394,7 +397,10 @@ impl Seen {
         let given_up: Vec<_> = mapped
             .given_up
             .iter()
-            .map(|g| json!({ "ink": g.ink.name(), "distance_with": g.with, "distance_without": g.without }))
+            .map(|g| json!({
+                "ink": g.ink.name(), "material": g.material, "share": g.share, "with": g.with, "without": g.without,
+                "hue_share": g.hue,
+            }))
             .collect();
         let pixels = mapped.pixels.map(|p| {
             json!({
@@ -411,10 +417,10 @@ impl Seen {
                 "uses_bases": self.print.uses_bases(), "gloss_scale": mapped.gloss_scale, "materials": materials,
                 "given_up": given_up, "pixels": pixels, "merged_pairs_if_blended": mapped.not_blended,
                 "measurement": halftoned.doubt,
-                "foils": halftoned.foils.as_ref().map(|gain| json!({
+                "held_back": halftoned.held_back.iter().map(|gain| json!({
                     "inks": gain.inks.iter().map(|ink| ink.name()).collect::<Vec<_>>(),
                     "distance_with": gain.after, "distance_without": gain.before,
-                })),
+                })).collect::<Vec<_>>(),
             },
             "fidelity": {
                 "eye_m": EYE, "mean": fidelity.mean, "rmse": fidelity.rmse, "p95": fidelity.p95, "max": fidelity.max,

@@ -34,8 +34,8 @@ fn a_document_is_placed_repeated_and_mirrored_dot_by_dot() {
     let place = "--at 10x20mm --repeat 2x3 --gap 1x2mm";
     bench.done(&format!("print tile {SMALL} -q {place} --mirror --to file:page.rgl"));
     let (plain, page) = (printed(&bench, "plain.rgl"), printed(&bench, "page.rgl"));
-    // 12 x 8 mm are 283 x 189 dots, in the middle of 2202 x 3082; 10 x 20 mm are 236 x 472 from the paper's corner,
-    // which is 80 x 71 dots from that of the printable area; gaps are 24 and 47 dots.
+    // 12 x 8 mm are 283 x 189 dots, in the middle of 2202 x 3082; 10 x 20 mm are 236 x 472 from the paper's
+    // corner, which is 80 x 71 dots from that of the printable area; gaps are 24 and 47 dots.
     let (left, top) = ((2202 - 283) / 2, (3082 - 189) / 2);
     let mut inked = 0;
     for (row, column) in (0..3).flat_map(|row| (0..2).map(move |column| (row, column))) {
@@ -107,10 +107,36 @@ fn differences_say_what_they_count() {
     let light = said("");
     let of = "with silver-foil the inks would come";
     assert!(light.contains(of) && light.contains("nearer to this document (root mean square"), "{light}");
-    assert!(light.contains("difference, light included, "), "{light}");
+    assert!(light.contains("difference, light, hue and grain included, "), "{light}");
     let paper = said("--preset paper");
     assert!(paper.contains(of) && paper.contains("nearer to the bases of this document"), "{paper}");
     assert!(paper.contains("difference d ") && !paper.contains("light included"), "{paper}");
+}
+
+/// Documents of materials, on plain paper with the default inks: metal, black, white, gloss.
+#[test]
+fn rules_that_the_program_can_keep_are_kept_unless_the_owner_asks() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    let touched = |args: &str| -> Vec<String> {
+        let plan: serde_json::Value =
+            serde_json::from_str(&bench.done(&format!("plan {args} --json -q"))).expect("JSON");
+        let checks = plan["checks"].as_array().expect("checks");
+        checks.iter().map(|check| check["rule"].as_str().expect("a name").to_owned()).collect()
+    };
+    let mut asked = Vec::new();
+    for document in ["sample:leaf --size 30mm", "sample:flange --size 30mm", &format!("tile {SMALL}")] {
+        let plain = touched(document);
+        for (rule, _) in
+            press::separate::keepers().filter(|(_, keeper)| *keeper == press::separate::Keeper::Program)
+        {
+            assert!(!plain.iter().any(|touched| touched == rule), "{document}: {plain:?}");
+        }
+        asked.extend(touched(&format!("{document} --inks P,silver-foil")));
+    }
+    for rule in ["primer-ribbon", "foil-code"] {
+        assert!(asked.iter().any(|touched| touched == rule), "{rule}: {asked:?}");
+    }
 }
 
 #[test]

@@ -1,7 +1,8 @@
-//! Every sample, and every real document at hand, becomes a job that the simulated printer prints dot for dot.
+//! Every sample, and every real document at hand, becomes a job that the simulated printer prints dot for
+//! dot.
 //!
-//! [`Job::prove`] itself refuses a sheet that differs from the page; what is asserted here is asserted of what came out
-//! of the printer. Real documents stand in the folder named by `FOILPRESS_DATA`.
+//! [`Job::prove`] itself refuses a sheet that differs from the page; what is asserted here is asserted of
+//! what came out of the printer. Real documents stand in the folder named by `FOILPRESS_DATA`.
 
 use appearance::document::{self, Options};
 use appearance::gamut::{self, Intent};
@@ -32,6 +33,7 @@ fn print(spec: &str, intent: Intent, inks: InkSet) -> Print {
         factor: factor::FactorSettings { bases: Some(4), ..Default::default() },
         gamut: gamut::GamutSettings { intent, ..Default::default() },
         inks,
+        held_back: inks::InkSet::EMPTY,
         halftone: Default::default(),
         size: Some(Size { width: side, height: Some(side) }),
     };

@@ -3,8 +3,10 @@
 use inks::{InkSet, Library, Severity, Stack};
 use maths::Maths;
 
+use super::rare::Brightness;
+use super::settings::GamutSettings;
 use crate::brdf::{self, Space, Table};
-use crate::solve::{Hull, LAYER_PRICE, MixtureError};
+use crate::solve::{Hull, LAYER_PRICE, MixtureError, SMALL};
 
 /// The stacks that can be printed with the available inks, and their curves.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,12 +19,15 @@ pub struct Printable {
     pub usual: usize,
     /// Whether a rule advises against each: such stacks are left out where that costs next to nothing.
     pub warned: Vec<bool>,
+    /// The dots of a cluster of each.
+    pub clusters: Vec<f64>,
 }
 
 impl Printable {
-    /// Stacks that no rule is about.
+    /// Stacks that no rule is about, in small clusters.
     pub fn new(stacks: Vec<Stack>, curves: Table) -> Printable {
-        Printable { usual: stacks.len(), warned: vec![false; stacks.len()], stacks, curves }
+        let n = stacks.len();
+        Printable { usual: n, warned: vec![false; n], clusters: vec![SMALL; n], stacks, curves }
     }
 
     /// The stacks of a library that need only these inks, in a half-angle space.
@@ -32,7 +37,8 @@ impl Printable {
         let advised =
             |stack| library.broken_rules(stack).iter().any(|rule| rule.severity == Severity::Warning);
         let warned = stacks.iter().map(advised).collect();
-        Printable { usual: stacks.len(), stacks, curves: brdf::rows(space, entries), warned }
+        let clusters = clusters(library, &stacks);
+        Printable { usual: stacks.len(), stacks, curves: brdf::rows(space, entries), warned, clusters }
     }
 
     /// Those, and every other stack that the rules allow and the library's model tells apart.
@@ -41,9 +47,14 @@ impl Printable {
         let others = library.combinations(at_hand);
         brdf::reflectances(&others, library, space).rows().for_each(|row| printable.curves.push(row));
         printable.warned.extend(others.iter().map(|_| false));
+        printable.clusters.extend(clusters(library, &others));
         printable.stacks.extend(others);
         printable
     }
+}
+
+fn clusters(library: &Library, stacks: &[Stack]) -> Vec<f64> {
+    stacks.iter().map(|stack| f64::from(library.minimum_cluster(stack))).collect()
 }
 
 /// Stacks and their hulls, with and without the price of their layers.
@@ -57,6 +68,8 @@ pub(super) struct Candidates {
     pub curves: Table,
     /// The albedo of each stack.
     albedo: Vec<[f64; 3]>,
+    /// How bright each is.
+    pub brightness: Brightness,
     /// With the price of the layers, which decides ties.
     pub priced: Hull,
     /// Without the price, for reported distances.
@@ -65,7 +78,7 @@ pub(super) struct Candidates {
 
 impl Candidates {
     pub fn new(space: &Space, printable: &Printable, light: f64) -> Result<Candidates, MixtureError> {
-        let Printable { stacks, curves, usual, warned } = printable;
+        let Printable { stacks, curves, usual, warned, clusters } = printable;
         let price: Vec<f64> = stacks.iter().map(|s| LAYER_PRICE * s.layers().len() as f64).collect();
         Ok(Candidates {
             inks: stacks.iter().map(|s| InkSet::of(s.layers().iter().copied())).collect(),
@@ -74,9 +87,23 @@ impl Candidates {
             stacks: stacks.clone(),
             curves: curves.clone(),
             albedo: curves.rows().map(|row| space.albedo(row)).collect(),
-            priced: Hull::new(space, curves, &price, light)?,
-            free: Hull::new(space, curves, &vec![0.0; stacks.len()], light)?,
+            brightness: Brightness::new(space, curves),
+            priced: Hull::new(space, curves, &price, light)?.in_clusters(clusters),
+            free: Hull::new(space, curves, &vec![0.0; stacks.len()], light)?.in_clusters(clusters),
         })
+    }
+
+    /// Those that settings ask for.
+    pub fn wanted(
+        space: &Space,
+        printable: &Printable,
+        settings: &GamutSettings,
+    ) -> Result<Candidates, MixtureError> {
+        let mut all = Candidates::new(space, printable, settings.light)?;
+        if !settings.hue {
+            (all.priced, all.free) = (all.priced.without_hue(), all.free.without_hue());
+        }
+        Ok(all)
     }
 
     pub fn len(&self) -> usize {
@@ -93,6 +120,7 @@ impl Candidates {
             extra: keep.iter().map(|&k| self.extra[k]).collect(),
             warned: keep.iter().map(|&k| self.warned[k]).collect(),
             albedo: keep.iter().map(|&k| self.albedo[k]).collect(),
+            brightness: self.brightness.subset(keep),
             curves,
             priced: self.priced.subset(keep),
             free: self.free.subset(keep),

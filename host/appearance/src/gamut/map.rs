@@ -13,15 +13,16 @@ use super::fitting::basis::Bases;
 use super::fitting::clamp::Clamped;
 use super::fitting::gloss::FEW_MERGED;
 use super::fitting::{basis, blend, clamp, local, spatial_average};
-use super::result::report::{GamutReport, GivenUp, Judged, Mapped, PixelReport};
-use super::result::{assemble, typical};
+use super::result::assemble;
+use super::result::report::{GamutReport, Judged, Mapped, PixelReport, Worth};
 use super::sample;
 use super::selection::cartridges::{Cartridges, Precision};
-use super::selection::fitted::Targets;
+use super::selection::fitted::{Service, Targets};
 use super::selection::{cartridges, stacks};
 use super::settings::{GamutSettings, Gloss, Intent};
+use super::things::Things;
 use crate::brdf::{Space, Table};
-use crate::materials::{Factored, Materials};
+use crate::materials::{Factored, Materials, words};
 use crate::solve::MixtureError;
 use crate::weights::{ONE, WeightMaps};
 
@@ -36,14 +37,18 @@ const HELPS: f64 = 0.8;
 /// The part of an equal share that every basis has at least where cartridges and stacks are chosen.
 const LEAST_SHARE: f64 = 0.25;
 
-/// Pixels of that sample from which typical materials are chosen.
-const TYPICAL_SAMPLE: usize = 256;
+/// The most materials that are shown of a document without bases, and the root mean square distance to them
+/// at which nothing more is shown: hardly visible.
+const SHOWN: (usize, f64) = (6, 0.015);
+/// The share of a document from which a material counts by itself. Source: 4 mm² of an A4 sheet, which is 2
+/// mm across, the end of what a viewer looks at on purpose.
+const COUNTS: f64 = 7e-5;
 
-/// Maps a document to the printer's gamut. `factored` gives its bases and weight maps, and is called only if the intent uses
-/// them. The result depends on the input and the settings alone, not on the number of threads.
+/// Maps a document to the printer's gamut. `factored` gives its bases and weight maps, and is called only
+/// if the intent uses them. The result depends on the input and the settings alone, not on the number of
+/// threads.
 ///
-/// # Errors
-/// Those of `factored`, and of the mapping.
+/// # Errors Those of `factored`, and of the mapping.
 pub fn map<'a, E: From<GamutError>>(
     pixels: &dyn Materials,
     factored: impl FnOnce() -> Result<Cow<'a, Factored>, E>,
@@ -90,8 +95,8 @@ pub fn clamped(
     document.fitted(&document.choose(None, observer)?, observer)
 }
 
-/// How much nearer inks come to a document with others beside them: root mean square distances of what cartridges are chosen by
-/// ([`Judged`]), in the metric of the settings.
+/// How much nearer inks come to a document with others beside them: root mean squares of the objective over
+/// what cartridges are chosen by ([`Judged`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gain {
     /// With the inks at hand.
@@ -102,8 +107,8 @@ pub struct Gain {
     pub inks: Vec<Ink>,
 }
 
-/// What the stacks of `more` would bring beside those at hand, under the same limit of cartridges, to what a mapping with
-/// `settings` judged its cartridges by ([`Mapped::judged`]); `None` if nothing.
+/// What the stacks of `more` would bring, under the same limit of cartridges, to what a mapping with
+/// `settings` judged its cartridges by ([`Mapped::judged`]); `None` if no material would gain by them.
 ///
 /// # Errors
 /// Those of the mapping.
@@ -115,40 +120,44 @@ pub fn gain(
     settings: &GamutSettings,
 ) -> Result<Option<Gain>, GamutError> {
     check_stacks(more)?;
-    let all = Candidates::new(space, more, settings.light).map_err(in_target("the stacks"))?;
+    let all = Candidates::wanted(space, more, settings).map_err(in_target("the stacks"))?;
     let rows = judged.rows.rows().enumerate();
     let rows = rows.map(|(i, row)| all.free.target(row).map_err(in_target(format!("material {i}"))));
-    let targets = Targets { rows: rows.collect::<Result<_, _>>()?, importance: judged.importance.clone() };
+    let targets = Targets {
+        rows: rows.collect::<Result<_, _>>()?,
+        importance: judged.importance.clone(),
+        counted: judged.counted.clone(),
+    };
     let best =
         cartridges::choose(&all, &targets, settings.most_cartridges, Precision::PRINT, &observe::Silent)?;
-    let (best, _) = cartridges::needed(&all, &targets, best)?;
+    let (best, _) = cartridges::needed(&all, &targets, best, settings.most_cartridges)?;
     let used = InkSet::of(best.stacks.iter().flat_map(|&k| all.inks[k].iter()));
     let known = InkSet::of(at_hand.stacks.iter().flat_map(|stack| stack.layers().iter().copied()));
-    let inks = used.iter().filter(|&ink| !known.contains(ink)).collect();
-    let gain = Gain { before: judged.distance, after: best.chosen, inks };
-    Ok((!cartridges::is_as_good(gain.before, gain.after) && !gain.inks.is_empty()).then_some(gain))
+    // Those that are needed serve some material, so there is a gain if one of them is new.
+    let inks: Vec<Ink> = used.iter().filter(|&ink| !known.contains(ink)).collect();
+    let gain = Gain { before: judged.objective, after: best.fitted.loss.sqrt(), inks };
+    Ok((!gain.inks.is_empty() && gain.after < gain.before).then_some(gain))
 }
 
-/// The best cartridges for a document: root mean square distances of a sample of its pixels, in the metric of the settings.
+/// The best cartridges for a document.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
-    /// The cartridges, each with what leaving it out costs, those that are missed most first.
-    pub chosen: Vec<GivenUp>,
+    /// The cartridges, each with what it does, those that are missed most first.
+    pub chosen: Vec<Worth>,
     /// Inks at hand that would serve beside them.
-    pub given_up: Vec<GivenUp>,
-    /// The distance with all inks at hand.
+    pub given_up: Vec<Worth>,
+    /// The root mean square of the objective over a sample of the document's pixels, with all inks at hand.
     pub all: f64,
-    /// The distance with the cartridges chosen.
+    /// The same with the cartridges chosen.
     pub distance: f64,
     /// The number of pixels in the sample.
     pub pixels: usize,
 }
 
-/// Chooses the cartridges whose mixtures come nearest to a document: exactly for a sample of its pixels, while a mapping takes
-/// the first set within 0.1 %.
+/// Chooses the cartridges whose mixtures come nearest to a document: exactly for a sample of its pixels,
+/// while a mapping takes the first set within 0.1 %.
 ///
-/// # Errors
-/// Those of the mapping.
+/// # Errors Those of the mapping.
 pub fn choose(
     pixels: &dyn Materials,
     printable: &Printable,
@@ -157,16 +166,17 @@ pub fn choose(
 ) -> Result<Choice, GamutError> {
     let settings = GamutSettings { intent: Intent::Clamp, ..settings.clone() };
     let document = Pixels::new(pixels, printable, &settings)?;
-    let (targets, _) = document.targets(None)?;
+    let (targets, rows) = document.targets(None)?;
     let all = &document.all;
     let best = cartridges::choose(all, &targets, settings.most_cartridges, Precision::EXACT, observer)?;
-    let (best, _) = cartridges::needed(all, &targets, best)?;
+    let (best, _) = cartridges::needed(all, &targets, best, settings.most_cartridges)?;
+    let space = pixels.space();
     Ok(Choice {
-        chosen: cartridges::worth(all, &targets, &best)?,
-        given_up: best.given_up,
+        chosen: named(space, &rows, &targets, &cartridges::worth(all, &targets, &best)?),
+        given_up: named(space, &rows, &targets, &best.given_up),
         all: best.all,
-        distance: best.chosen,
-        pixels: targets.rows.len(),
+        distance: best.fitted.loss.sqrt(),
+        pixels: targets.rows.len() - targets.counted.len(),
     })
 }
 
@@ -177,12 +187,13 @@ struct Pixels<'a> {
     all: Candidates,
     sampled: Vec<usize>,
     sample: Table,
+    things: Things,
 }
 
 /// The stacks that were chosen, and the cartridges that were not.
 struct Chosen {
     candidates: Candidates,
-    given_up: Vec<GivenUp>,
+    given_up: Vec<Worth>,
     judged: Judged,
 }
 
@@ -200,29 +211,31 @@ impl<'a> Pixels<'a> {
         settings: &'a GamutSettings,
     ) -> Result<Self, GamutError> {
         check_stacks(printable)?;
-        let all =
-            Candidates::new(pixels.space(), printable, settings.light).map_err(in_target("the stacks"))?;
+        let all = Candidates::wanted(pixels.space(), printable, settings).map_err(in_target("the stacks"))?;
         let sampled = sample::pixels(pixels.width() * pixels.height(), SAMPLE, settings.seed);
         let sample = sample::rows(pixels, &sampled);
-        Ok(Pixels { pixels, settings, all, sampled, sample })
+        Ok(Pixels { pixels, settings, all, sampled, sample, things: Things::find(pixels) })
     }
 
-    /// What cartridges and stacks are chosen by: sampled pixels and the bases, whichever the intent maps.
+    /// What cartridges and stacks are chosen by: sampled pixels, each material that counts, and the bases,
+    /// whichever the intent maps.
     fn targets(&self, bases: Option<&Factored>) -> Result<(Targets, Table), GamutError> {
         let mut rows = Table::new(self.pixels.space().columns());
-        let mut targets = Targets { rows: Vec::new(), importance: Vec::new() };
-        let mut add = |row: &[f64], importance: f64, what: String| {
+        let mut targets = Targets { rows: Vec::new(), importance: Vec::new(), counted: Vec::new() };
+        let mut add = |row: &[f64], importance: f64, counts: Option<f64>, what: String| {
             rows.push(row);
             targets.rows.push(self.all.free.target(row).map_err(in_target(what))?);
             targets.importance.push(importance);
+            targets.counted.extend(counts.map(|share| (targets.rows.len() - 1, share)));
             Ok::<_, GamutError>(())
         };
         if let Some(bases) = bases {
             let shares = bases.shares();
             for (i, (row, share)) in bases.bases.rows().zip(&shares).enumerate() {
-                // A twig is seen as well as the sky around it: no basis counts less than a part of an equal share.
+                // A twig is seen as well as the sky around it: no basis counts less than a part of an equal
+                // share.
                 let importance = share.max(LEAST_SHARE / shares.len() as f64);
-                add(row, importance, format!("basis {i}"))?;
+                add(row, importance, Some(*share).filter(|share| *share >= COUNTS), format!("basis {i}"))?;
             }
         }
         if self.settings.intent != Intent::Basis {
@@ -230,35 +243,44 @@ impl<'a> Pixels<'a> {
             let total = self.pixels.width() * self.pixels.height();
             let few = sample::pixels(total, CARTRIDGE_SAMPLE, self.settings.seed ^ 1);
             for (row, pixel) in sample::rows(self.pixels, &few).rows().zip(&few) {
-                add(row, 1.0 / few.len() as f64, format!("pixel {pixel}"))?;
+                add(row, 1.0 / few.len() as f64, None, format!("pixel {pixel}"))?;
+            }
+            // Each as much as a pixel, so that none is missed by the draw.
+            let counted = self.things.rows.rows().zip(&self.things.shares).enumerate();
+            for (i, (row, &share)) in counted.take_while(|(i, (_, share))| *i == 0 || **share >= COUNTS) {
+                add(row, 1.0 / few.len() as f64, Some(share), format!("material {i}"))?;
             }
         }
         Ok((targets, rows))
     }
 
-    fn cartridges(&self, targets: &Targets, observer: &dyn Observer) -> Result<Cartridges, GamutError> {
+    fn cartridges(
+        &self,
+        (targets, rows): (&Targets, &Table),
+        observer: &dyn Observer,
+    ) -> Result<(Cartridges, Vec<Worth>), GamutError> {
         let most = self.settings.most_cartridges;
         let cartridges = cartridges::choose(&self.all, targets, most, Precision::PRINT, observer)?;
-        let (cartridges, spared) = cartridges::needed(&self.all, targets, cartridges)?;
-        if let Some(words) = spared_in_words(&spared, self.settings) {
+        let (cartridges, spared) = cartridges::needed(&self.all, targets, cartridges, most)?;
+        let named = |services: &[(Ink, Service)]| named(self.pixels.space(), rows, targets, services);
+        let given_up = named(&cartridges.given_up);
+        for words in spared_in_words(&named(&spared)).into_iter().chain(in_words(&given_up, most)) {
             observer.note(&words);
         }
-        if let Some(words) = in_words(&cartridges, self.settings) {
-            observer.note(&words);
-        }
-        Ok(cartridges)
+        Ok((cartridges, given_up))
     }
 
     /// Chooses cartridges, and the stacks that they print.
     fn choose(&self, bases: Option<&Factored>, observer: &dyn Observer) -> Result<Chosen, GamutError> {
         let (targets, rows) = self.targets(bases)?;
-        let cartridges = self.cartridges(&targets, observer)?;
+        let (cartridges, given_up) = self.cartridges((&targets, &rows), observer)?;
         let stacks =
             stacks::choose(&self.all, &cartridges.stacks, &targets).map_err(in_target("choosing stacks"))?;
         let candidates = self.all.subset(&stacks);
         check_number(&candidates.stacks)?;
-        let judged = Judged { rows, importance: targets.importance, distance: cartridges.chosen };
-        Ok(Chosen { candidates, given_up: cartridges.given_up, judged })
+        let Targets { importance, counted, .. } = targets;
+        let judged = Judged { rows, importance, counted, objective: cartridges.fitted.loss.sqrt() };
+        Ok(Chosen { candidates, given_up, judged })
     }
 
     /// Whether clamping keeps most pairs of sampled materials apart.
@@ -287,11 +309,8 @@ impl<'a> Pixels<'a> {
         observer: &dyn Observer,
     ) -> Result<Mapped, GamutError> {
         let Chosen { candidates, given_up, .. } = chosen;
-        let few = TYPICAL_SAMPLE.min(self.sample.len());
-        let mut some = Table::new(self.sample.columns());
-        (0..few).for_each(|i| some.push(self.sample.row(i * self.sample.len() / few)));
         let space = self.pixels.space();
-        let (rows, shares) = typical::rows(space, &some);
+        let (rows, shares) = self.things.typical(space, SHOWN.0, SHOWN.1);
         let shown = basis::map(space, &rows, &shares, candidates, Gloss::Keep)?;
         let mut kept = 1.0;
         let intent = match self.settings.intent {
@@ -508,34 +527,55 @@ fn in_target(what: impl Into<String>) -> impl FnOnce(MixtureError) -> GamutError
     move |source| GamutError::Mixture { what, source }
 }
 
-/// A sentence that names the inks that were left out and what that costs.
-/// Which cartridges were left out because they bring nothing that is seen.
-fn spared_in_words(spared: &[GivenUp], settings: &GamutSettings) -> Option<String> {
-    let (first, last) = (spared.first()?, spared.last()?);
+/// Inks with what people call the material that each serves most.
+fn named(space: &Space, rows: &Table, targets: &Targets, services: &[(Ink, Service)]) -> Vec<Worth> {
+    let one = |&(ink, Service { counted, with, without, hue, .. }): &(Ink, Service)| {
+        let (row, share) = targets.counted[counted];
+        Worth { ink, material: words(space, rows.row(row)), share, with, without, hue }
+    };
+    services.iter().map(one).collect()
+}
+
+/// A share in words.
+fn percent(share: f64) -> String {
+    match 100.0 * share {
+        small if small < 0.1 => format!("{small:.2} %"),
+        small if small < 1.0 => format!("{small:.1} %"),
+        large => format!("{large:.0} %"),
+    }
+}
+
+/// Which cartridges were left out because they bring nothing to any material.
+fn spared_in_words(spared: &[Worth]) -> Option<String> {
     let names: Vec<&str> = spared.iter().map(|spared| spared.ink.name()).collect();
+    let most = spared.iter().map(|spared| spared.without - spared.with).reduce(f64::max)?;
     Some(format!(
-        "left out, because nobody would see what they bring: {} (the root mean square difference{} changes from {:.4} to {:.4})",
+        "left out, because no material gains by them: {} (at most {:.4}, where 0.01 is barely visible)",
         names.join(", "),
-        settings.measure(),
-        first.with,
-        last.without
+        most.max(0.0)
     ))
 }
 
-fn in_words(cartridges: &Cartridges, settings: &GamutSettings) -> Option<String> {
-    let names: Vec<&str> = cartridges.given_up.iter().map(|given_up| given_up.ink.name()).collect();
-    let listed = match names.split_last()? {
+/// Which were left out for the number of cartridges, and which material pays.
+fn in_words(given_up: &[Worth], most: usize) -> Option<String> {
+    let each = given_up.iter().map(|Worth { ink, material, share, with, without, hue }| {
+        let share = percent(*share);
+        let hue = if *hue >= 0.005 {
+            format!("; {} of the sheet lose their hue", percent(*hue))
+        } else {
+            String::new()
+        };
+        format!(
+            "{} (the {material}, {share} of the sheet, pays: {with:.3} with it, {without:.3} without{hue})",
+            ink.name()
+        )
+    });
+    let each: Vec<String> = each.collect();
+    let listed = match each.split_last()? {
         (last, []) => format!("{last} is"),
         (last, others) => format!("{} and {last} are", others.join(", ")),
     };
-    let (before, after) = (format!("{:.4}", cartridges.all), format!("{:.4}", cartridges.chosen));
-    let measure = settings.measure();
-    let cost = if before == after {
-        format!("the root mean square difference{measure} stays at {before}")
-    } else {
-        format!("the root mean square difference{measure} changes from {before} to {after}")
-    };
-    Some(format!("{listed} left out to use at most {} cartridges; {cost}", settings.most_cartridges))
+    Some(format!("{listed} left out to use at most {most} cartridges"))
 }
 
 fn check_stacks(printable: &Printable) -> Result<(), GamutError> {

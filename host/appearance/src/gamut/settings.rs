@@ -6,8 +6,8 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Intent {
-    /// Clamp, unless that merges more than 1 % of the pairs of different materials and blending at least a fifth fewer; then
-    /// blend.
+    /// Clamp, unless that merges more than 1 % of the pairs of different materials and blending at least a
+    /// fifth fewer; then blend.
     #[default]
     Auto,
     /// Map the bases and keep the weights: relative differences survive.
@@ -16,7 +16,8 @@ pub enum Intent {
     Clamp,
     /// Clamped pixels where they are close to the target, the mapped bases elsewhere.
     Blend,
-    /// Clamp in the gamut; outside it, keep differences between neighbouring pixels at the price of closeness.
+    /// Clamp in the gamut; outside it, keep differences between neighbouring pixels at the price of
+    /// closeness.
     Contrast,
 }
 
@@ -27,8 +28,8 @@ impl Intent {
     }
 }
 
-/// The weight of the distance in light beside distance d at which metals shine and other materials hardly change;
-/// `docs/decisions/metric-that-knows-light.md` has the figures.
+/// The weight of the distance in light beside distance d at which metals shine and other materials hardly
+/// change; `docs/decisions/metric-that-knows-light.md` has the figures.
 pub const LIGHT: f64 = 0.28;
 
 /// How the gloss of the bases is treated before they are mapped.
@@ -48,11 +49,15 @@ pub enum Gloss {
 pub struct GamutSettings {
     /// What to do with materials outside the gamut.
     pub intent: Intent,
-    /// Mixtures are chosen by distance d and this times the distance in light ([`LIGHT`]), as sides of a right angle; 0 is
-    /// the metric of the 2009 paper.
+    /// Mixtures are chosen by distance d and this times the distance in light ([`LIGHT`]), as sides of a
+    /// right angle; 0 is the metric of the 2009 paper.
     pub light: f64,
-    /// Side in pixels of the square that an eye averages over. With it, clamped pixels are moved so that their means over such
-    /// squares come nearer, at the price of each by itself; without it, each pixel comes as near as it can.
+    /// Whether hue in the dark has a price of its own, if light has a weight. In a print of two pictures it
+    /// would be bought with the one in the reflection, so there distances alone decide.
+    pub hue: bool,
+    /// Side in pixels of the square that an eye averages over. With it, clamped pixels are moved so that
+    /// their means over such squares come nearer, at the price of each by itself; without it, each pixel
+    /// comes as near as it can.
     pub eye: Option<f64>,
     /// How the gloss of the bases is treated.
     pub gloss: Gloss,
@@ -67,17 +72,11 @@ impl Default for GamutSettings {
         GamutSettings {
             intent: Intent::Auto,
             light: LIGHT,
+            hue: true,
             eye: None,
             gloss: Gloss::WhereMerged,
             most_cartridges: 7,
             seed: 1,
         }
-    }
-}
-
-impl GamutSettings {
-    /// What a difference in this metric counts, in words that follow "difference".
-    pub fn measure(&self) -> &'static str {
-        if self.light > 0.0 { ", light included," } else { " d" }
     }
 }

@@ -145,34 +145,56 @@ proptest! {
 
     /// Section 4.1: if the bases are printable, so is every pixel, and it is printed as it is.
     #[test]
-    fn documents_in_the_gamut_are_printed_exactly(
+    fn documents_in_the_gamut_are_printed_as_well_as_exactly(
         parts in prop::collection::vec(prop::collection::vec(0.1f64..1.0, 3), 4),
         stacks in prop::collection::vec(0usize..9, 12),
     ) {
         let space = space();
         let printable = everything(&space);
         let mut bases = Table::new(space.columns());
+        let mut shares = vec![vec![0.0; printable.stacks.len()]; parts.len()];
         for (i, part) in parts.iter().enumerate() {
             let sum: f64 = part.iter().sum();
             let mut row = vec![0.0; space.columns()];
             for (part, &k) in part.iter().zip(&stacks[3 * i..]) {
+                shares[i][k] += part / sum;
                 row.iter_mut().zip(printable.curves.row(k)).for_each(|(r, f)| *r += part / sum * f);
             }
             bases.push(&row);
         }
         let document = Factored { space: space.clone(), bases, maps: pattern(6, 5) };
         // All inks, so that none must be given up for another.
-        let settings = GamutSettings { most_cartridges: 13, ..basis_settings() };
+        let settings = GamutSettings { most_cartridges: 13, intent: Intent::Clamp, ..GamutSettings::default() };
         let mapped = map(&document, None, &printable, &settings, &Silent).unwrap();
         is_printable(&mapped.mix, 13);
-        let mut target = vec![0f32; space.columns()];
+        // By distance alone nothing is nearer than the mixture itself, of bases, too, but for what a
+        // cartridge is worth.
+        let paper = GamutSettings { most_cartridges: 13, light: 0.0, ..basis_settings() };
+        let by_bases = map(&document, None, &printable, &paper, &Silent).unwrap().mix;
+        let hull = candidates::Candidates::new(&space, &printable, settings.light).unwrap().free;
+        let (mut target, mut weights) = (vec![0f32; space.columns()], vec![0.0; mapped.mix.stacks.len()]);
+        let mut more = 0.0;
         for pixel in 0..30 {
             document.reflectance(pixel, &mut target);
             let target: Vec<f64> = target.iter().map(|&f| f64::from(f)).collect();
-            let d = space.distance(&target, &printed_row(&mapped.mix, &printable, pixel));
-            // Cartridges that bring less than 5e-5 on average are left out; shares are rounded to 1/32768.
-            prop_assert!(d < 1e-3, "pixel {pixel}: {d}");
+            let d = space.distance(&target, &printed_row(&by_bases, &printable, pixel));
+            prop_assert!(d < 0.01, "pixel {pixel}: {d}");
+            let target = hull.target(&target).unwrap();
+            let (mut exact, mut printed) = (vec![0.0; shares[0].len()], vec![0.0; shares[0].len()]);
+            for (&weight, shares) in document.maps.at(pixel).iter().zip(&shares) {
+                exact.iter_mut().zip(shares).for_each(|(exact, s)| *exact += s * f64::from(weight) / f64::from(ONE));
+            }
+            mapped.mix.shares(pixel, &mut weights);
+            for (stack, share) in mapped.mix.stacks.iter().zip(&weights) {
+                printed[printable.stacks.iter().position(|s| s == stack).unwrap()] = *share;
+            }
+            // Grain has a price, so a mixture may be off for less of it, by no more than it saves.
+            let [exact, printed] = [exact, printed].map(|a| crate::solve::Mixer::new().objective(&hull, &target, &a));
+            prop_assert!(printed < exact + 0.02, "pixel {pixel}: {printed}, not {exact}");
+            more += (printed - exact) / 30.0;
         }
+        // Cartridges that bring a material less than this are left out.
+        prop_assert!(more < 0.005, "{more} more on the mean");
     }
 }
 
@@ -208,7 +230,7 @@ fn rungs(
 fn is_the_ladder(rungs: &[f64]) {
     // The gloss coat alone is 50 %, so the ladder at half height is its share: 1, 0.8, 0.5, 0.1.
     for (rung, expected) in rungs.iter().zip([1.0, 0.8, 0.5, 0.1]) {
-        assert!((rung - expected).abs() < 0.02, "{rungs:?}");
+        assert!((rung - expected).abs() < 0.03, "{rungs:?}");
     }
 }
 
@@ -228,7 +250,8 @@ fn without_scaling_the_upper_rungs_are_clamped_together() {
     assert_eq!(report.gloss_scale, None);
 }
 
-/// The case of the paper: the extremes are the bases, and the steps between them keep their relative positions.
+/// The case of the paper: the extremes are the bases, and the steps between them keep their relative
+/// positions.
 #[test]
 fn the_ladder_stays_a_ladder_when_its_ends_are_the_bases() {
     let gloss = [1.0, 0.8, 0.5, 0.1];
@@ -252,7 +275,8 @@ fn clamping_the_ladder_merges_it() {
     assert!(report.pixels.unwrap().merged > 0.01);
 }
 
-/// Stripes of gloss far beyond what can be printed, each a basis: clamping prints them alike, a blend scales them apart.
+/// Stripes of gloss far beyond what can be printed, each a basis: clamping prints them alike, a blend
+/// scales them apart.
 #[test]
 fn the_automatic_choice_blends_where_that_keeps_materials_apart() {
     let space = space();
@@ -271,8 +295,8 @@ fn the_automatic_choice_blends_where_that_keeps_materials_apart() {
     assert!(merged(&auto) < 0.8 * merged(&clamped), "{} {}", merged(&auto), merged(&clamped));
 }
 
-/// All materials that clamping merges are far outside the gamut, and one basis stands for them: a blend prints all of them as that
-/// basis and keeps no more apart.
+/// All materials that clamping merges are far outside the gamut, and one basis stands for them: a blend
+/// prints all of them as that basis and keeps no more apart.
 #[test]
 fn the_automatic_choice_clamps_where_a_blend_merges_as_many() {
     let space = space();
@@ -336,7 +360,11 @@ fn the_gain_of_inks_is_judged_by_what_the_intent_maps() {
         let run = |printable| map(&document, Some(&pixels), printable, &settings, &Silent).unwrap();
         let (without, with) = (run(&few), run(&more));
         let gain = gain(&without.judged, &few, &more, &space, &settings).unwrap().unwrap();
-        assert_eq!((gain.before, gain.after), (without.judged.distance, with.judged.distance), "{intent:?}");
+        assert_eq!(
+            (gain.before, gain.after),
+            (without.judged.objective, with.judged.objective),
+            "{intent:?}"
+        );
         assert!(gain.inks.contains(&Ink::SilverFoil), "{gain:?}");
         if intent == Intent::Basis {
             let materials = &with.report.materials;
@@ -392,14 +420,14 @@ fn fewer_cartridges_are_kept_to_and_cost_distance() {
     let mut last = 0.0;
     for most in [13, 7, 5, 1, 0] {
         let settings = GamutSettings { most_cartridges: most, gloss: Gloss::Keep, ..basis_settings() };
-        let Mapped { mix, report, .. } = map(&document, None, &printable, &settings, &Silent).unwrap();
+        let Mapped { mix, report, judged } = map(&document, None, &printable, &settings, &Silent).unwrap();
         is_printable(&mix, most);
         assert_eq!(report.cartridges, mix.inks());
-        let sum: f64 = report.materials.iter().map(|b| b.distance * b.distance).sum();
-        assert!(sum >= last - 1e-9, "{most}: {sum} {last}");
-        last = sum;
+        // Up to what is left out because nobody sees it.
+        assert!(judged.objective >= last - 1e-3, "{most}: {} {last}", judged.objective);
+        last = judged.objective;
         assert!(report.given_up.iter().all(|g| g.with <= g.without + 1e-12));
-        assert!(report.given_up.windows(2).all(|w| w[0].with <= w[1].with));
+        assert!(report.given_up.windows(2).all(|w| w[0].without - w[0].with >= w[1].without - w[1].with));
     }
 }
 
@@ -460,17 +488,20 @@ fn every_clamped_pixel_is_its_own_best() {
     for pixel in (0..380).step_by(3) {
         pixels.reflectance(pixel, &mut row);
         let target: Vec<f64> = row.iter().map(|&f| f64::from(f)).collect();
-        with_all += mixer.best(&all, &all.target(&target).unwrap()).unwrap().fit.distance.powi(2);
-        let best = mixer.best(&used, &used.target(&target).unwrap()).unwrap().fit.distance;
+        with_all += mixer.best(&all, &all.target(&target).unwrap()).unwrap().fit.objective.powi(2);
+        let own = mixer.best(&used, &used.target(&target).unwrap()).unwrap();
+        let best = own.fit.objective;
         mapped.mix.shares(pixel, &mut shares);
-        let d = used.distance(&shares, &used.target(&target).unwrap());
-        // Price of layers, pruning and rounding of shares.
-        assert!(d >= best - 1e-9 && d < best + 5e-4, "pixel {pixel}: {d} {best}");
+        // With the grain that is seen of each share, as what is rare is judged; price of layers and
+        // rounding of shares.
+        let aim = used.target(&target).unwrap();
+        let (found, least) = (mixer.exactly(&used, &aim, &shares), mixer.exactly(&used, &aim, &own.weights));
+        assert!(found < least + 1e-3, "pixel {pixel}: {found} {least}");
         with_used += best.powi(2);
     }
-    // Cartridges and stacks that bring less than 1 % each were left out.
+    // Cartridges that bring less to each material than half of what is barely visible were left out.
     let (with_all, with_used) = (with_all.sqrt(), with_used.sqrt());
-    assert!(with_used >= with_all - 1e-9 && with_used < 1.03 * with_all, "{with_used} {with_all}");
+    assert!(with_used >= with_all - 1e-9 && with_used < 1.1 * with_all, "{with_used} {with_all}");
     let report = mapped.report.pixels.unwrap();
     assert!(report.gap <= 1e-7 && report.rms <= report.max && report.p95 <= report.max, "{report:?}");
 }
@@ -536,7 +567,7 @@ fn blending_follows_the_clamped_mix_inside_the_gamut() {
     let d = space
         .distance(&printed_row(&clamped.mix, &printable, 99), &printed_row(&blended.mix, &printable, 99));
     // Each has cartridges and stacks of its own, without those that bring less than is seen.
-    assert!(d < 2e-3, "{d}");
+    assert!(d < 0.01, "{d}");
 }
 
 #[test]

@@ -1,27 +1,31 @@
 //! The surface of the texture workflows that is nearest to a curve.
 //!
-//! Problem: edits and file formats speak of a body colour, a highlight and its width; a curve is numbers over the half angle.
-//! Method: a body and one GGX lobe, `diffuse / pi + f0 lobe(alpha)`. For a given alpha both are linear: least squares,
-//! channel by channel, on the metric linearised at the curve, neither below 0. Alpha is the same for all channels and found by
-//! a scan of [`STEPS`] widths and a golden-section search between the neighbours of the best; both judge by the metric itself.
-//! For pictures, [`Widths`] judges by the linearised metric, among widths whose lobes are prepared.
-//! A curve that falls to nothing where others are light, as a basis less some of another may, has infinite slopes there, which would leave
-//! black as the nearest surface: where a difference is seen, it is fitted again with what is darker than the mean counting like the mean,
-//! and the nearer of both is taken.
-//! Cost: some 60 distances, twice that for what is fitted again, or [`Widths`] some 20 sums. A curve that has this form is found to 1e-6.
+//! Problem: edits and file formats speak of a body colour, a highlight and its width; a curve is numbers
+//! over the half angle.
+//! Method: a body and one GGX lobe, `diffuse / pi + f0 lobe(alpha)`. For a given alpha both are linear:
+//! least squares, channel by channel, on the metric linearised at the curve, neither below 0. Alpha is the
+//! same for all channels and found by a scan of [`STEPS`] widths and a golden-section search between the
+//! neighbours of the best; both judge by the metric itself. For pictures, [`Widths`] judges by the
+//! linearised metric, among widths whose lobes are prepared. A curve that falls to nothing where others are
+//! light, as a basis less some of another may, has infinite slopes there, which would leave black as the
+//! nearest surface: where a difference is seen, it is fitted again with what is darker than the mean
+//! counting like the mean, and the nearer of both is taken.
+//! Cost: some 60 distances, twice that for what is fitted again, or [`Widths`] some 20 sums. A curve that
+//! has this form is found to 1e-6.
 //! Limits: one lobe. Of two, it is the one that is seen most; [`Nearest::distance`] says what is missing.
 
 use maths::Maths;
 use std::f64::consts::PI;
 
 use crate::brdf::Space;
+use crate::srgb::luminance;
 
 /// Reflectance of a dielectric at normal incidence, as the metallic workflow has it: index 1.5. Source: glTF
 /// 2.0, appendix B.
 pub const DIELECTRIC: f64 = 0.04;
 
-/// Factor on [`DIELECTRIC`] up to which a highlight is a dielectric's if a metal explains it as well: in the metric, less than what is barely
-/// visible.
+/// Factor on [`DIELECTRIC`] up to which a highlight is a dielectric's if a metal explains it as well: in
+/// the metric, less than what is barely visible.
 const ALSO: f64 = 1.1;
 
 /// The widths of lobes that a document may have.
@@ -122,8 +126,8 @@ impl Nearest {
         [at_left, at_right].into_iter().fold(found, |a, b| if b.distance < a.distance { b } else { a })
     }
 
-    /// Base colour and metalness: those whose luminances of body and highlight are these, with what remains of the
-    /// highlight beside a dielectric's own in the base colour.
+    /// Base colour and metalness: those whose luminances of body and highlight are these, with what remains
+    /// of the highlight beside a dielectric's own in the base colour.
     pub fn metallic(&self) -> Metallic {
         Metallic::from_colours(&self.diffuse, &self.f0)
     }
@@ -148,12 +152,12 @@ impl Near {
 
 impl Metallic {
     fn from_colours(diffuse: &[f64; 3], f0: &[f64; 3]) -> Metallic {
-        let [body, shine] = [diffuse, f0].map(|c| 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]);
+        let [body, shine] = [diffuse, f0].map(|&c| luminance(c));
         // diffuse = base (1 - m) (1 - q) and f0 = q (1 - m) + base m are q m^2 + b m + (q - shine) = 0.
         let q = DIELECTRIC;
         let b = body / (1.0 - q) - 2.0 * q + shine;
-        // Below 0, b is of a base darker than what a metal needs to be told from a black dielectric: as much highlight as a dielectric's
-        // has both as its solution, and no metal is so dark.
+        // Below 0, b is of a base darker than what a metal needs to be told from a black dielectric: as
+        // much highlight as a dielectric's has both as its solution, and no metal is so dark.
         let metallic = if shine <= if b < 0.0 { ALSO * q } else { q } {
             0.0
         } else {
@@ -173,8 +177,8 @@ impl<'a> Widths<'a> {
         Widths { space, lobes: alphas.iter().map(|&alpha| lobe(space, alpha)).collect() }
     }
 
-    /// The best body and lobe for a row, in the metric linearised there: every sixteenth width, then ever nearer to the best.
-    /// `None` without any width.
+    /// The best body and lobe for a row, in the metric linearised there: every sixteenth width, then ever
+    /// nearer to the best. `None` without any width.
     pub fn nearest(&self, row: &[f64]) -> Option<Near> {
         let target = Target::new(self.space, row);
         let judged = |width: usize| (target.body_and_lobe(&self.lobes[width]).2, width);
@@ -239,7 +243,8 @@ impl<'a> Target<'a> {
         Nearest { diffuse, f0, alpha, distance }
     }
 
-    /// The best body and amount of a lobe, and the square of the distance that is left in the linearised metric, times 9.
+    /// The best body and amount of a lobe, and the square of the distance that is left in the linearised
+    /// metric, times 9.
     fn body_and_lobe(&self, lobes: &[f64]) -> ([f64; 3], [f64; 3], f64) {
         let (mut diffuse, mut f0, mut rest) = ([0.0; 3], [0.0; 3], 0.0);
         for c in 0..3 {
@@ -294,7 +299,7 @@ mod tests {
             }
             let Metallic { base: found_base, metallic: m } = found.metallic();
             // A metal as dark as a dielectric's highlight is a dielectric.
-            let light = 0.2126 * base[0] + 0.7152 * base[1] + 0.0722 * base[2];
+            let light = luminance(base.map(f64::from));
             if light < 0.08 && metallic > 0.0 {
                 return Ok(());
             }
@@ -307,7 +312,8 @@ mod tests {
 
     proptest! {
         #![proptest_config(testing::cases(24))]
-        /// Among prepared widths is one nearly as good as the best of all, for two surfaces side by side, too.
+        /// Among prepared widths is one nearly as good as the best of all, for two surfaces side by side,
+        /// too.
         #[test]
         fn prepared_widths_are_nearly_as_good(
             base in prop::array::uniform3(0.02f32..0.98), roughness in prop::array::uniform2(0.2f32..0.9),
@@ -330,8 +336,8 @@ mod tests {
         }
     }
 
-    /// Over a grid of glTF materials: no dielectric has metal in it, however dark and rough, every metal has, and what is returned shows the
-    /// same curve.
+    /// Over a grid of glTF materials: no dielectric has metal in it, however dark and rough, every metal
+    /// has, and what is returned shows the same curve.
     #[test]
     fn dielectrics_are_no_metals() {
         let space = Space::half_angle(32);

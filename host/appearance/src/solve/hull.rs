@@ -1,21 +1,25 @@
 //! The two sides of equation 1 in the form the metric needs: the stacks that can be mixed, and a target.
 //!
-//! Problem: the metric compares cube roots of reflected radiance, weighted by column; tables hold reflectance.
+//! Problem: the metric compares cube roots of reflected radiance, weighted by column; tables hold
+//! reflectance.
 //! Method: both are converted to radiance once, targets also to cube roots, and checked, so that the solver
-//! ([`super::Mixer`]) receives only finite numbers of 0 or more. With a weight for light, three more columns hold the albedo
-//! of each channel ([`Space::albedo`]); it is linear in the mixture like every other column.
-//! Cost: one multiplication per number and one cube root per column of a target. Limits: radiance below a trillionth of
-//! the brightest stack counts as that much, since the cube root has no finite slope at 0.
+//! ([`super::Mixer`]) receives only finite numbers of 0 or more. With a weight for light, three more
+//! columns hold the albedo of each channel ([`Space::albedo`]); it is linear in the mixture like every
+//! other column. Then a mixture also pays for its grain: `Σ_k a_k D_k^2`, D_k being the distance of stack k
+//! by itself, is the variance of its dots and the square of what it misses.
+//! Cost: one multiplication per number and one cube root per column of a target. Limits: radiance below a
+//! trillionth of the brightest stack counts as that much, since the cube root has no finite slope at 0.
 //! Source: the appendix of the 2009 paper.
 
 use crate::brdf::{Space, Table};
 
 use super::columns::Columns;
-use super::hue::{Aim, Hue};
+use super::hue::{Aim, COLUMNS, Hue, in_places};
 use super::root::inverse_cbrt;
 use super::simplex::SimplexError;
 use super::vector::add_scaled;
 use crate::wide::wide;
+use maths::Maths as _;
 
 /// The number of columns is a multiple of this, so that sums are equal on every processor.
 const LANES: usize = 8;
@@ -23,6 +27,21 @@ const LANES: usize = 8;
 /// Price of one layer of ink, in units of squared distance. It decides between mixtures that would look
 /// alike: a tenth of what is barely visible, squared.
 pub(crate) const LAYER_PRICE: f64 = 1e-6;
+
+/// The part of the variance of a stack that is seen where mixtures are chosen: that of one with a share of
+/// a tenth. Of mixtures that look the same it prefers the one with the least grain; rare stacks are judged
+/// afterwards, by what is seen of theirs.
+/// Source: clusters of three dots with a share a lie sqrt(a) / .127 mm apart, and the contrast sensitivity
+/// exp(-f / 5.17 cycles a degree) at .5 m passes exp(-26.6 sqrt(a)) of the variance.
+const GRAIN: f64 = 0.0002;
+
+/// Dots of a cluster of process inks. Source: the built-in library.
+pub(crate) const SMALL: f64 = 4.0;
+
+/// The part of the variance of a stack with this share that an eye sees at .5 m. Source: as for [`GRAIN`].
+pub(crate) fn seen_of_share(share: f64) -> f64 {
+    (-26.6 * share.sqrt()).exponential()
+}
 
 /// Darkest radiance that differs from black, relative to the brightest radiance of any stack: its cube root
 /// is 1e-4 of the brightest one's, so that nobody sees it.
@@ -72,7 +91,8 @@ pub enum MixtureError {
 pub struct Hull {
     /// For each column of the space, the factor from reflectance to radiance.
     radiance: Vec<f64>,
-    /// For each configuration, the factor from radiance to its share in the albedo; empty without a weight for light.
+    /// For each configuration, the factor from radiance to its share in the albedo; empty without a weight
+    /// for light.
     light: Vec<f64>,
     pub(super) hue: Option<Hue>,
     pub(super) weight: Vec<f64>,
@@ -81,6 +101,12 @@ pub struct Hull {
     pub(super) by_column: Columns,
     pub(super) price: Vec<f64>,
     pub(super) darkest: f64,
+    /// The weighted cube roots of every stack by itself, by column, and the square of their length.
+    looks: Columns,
+    sizes: Vec<f64>,
+    /// What the squared distance of every stack from the target counts in a mixture, by its share:
+    /// [`GRAIN`] or, without a weight for light, nothing.
+    grain: f64,
 }
 
 /// A target: its radiance and the cube roots of it.
@@ -97,6 +123,11 @@ impl Target {
     pub(crate) fn brightness(&self, hull: &Hull) -> f64 {
         let curve = self.root.iter().zip(&hull.weight).take(hull.curve_columns());
         curve.map(|(root, w)| root * w * w).sum()
+    }
+
+    /// The number of its columns.
+    pub(crate) fn columns(&self) -> usize {
+        self.root.len()
     }
 
     /// The weighted cube roots of evenly spaced columns: a rough measure of how far two targets are apart.
@@ -120,9 +151,9 @@ fn append_albedo(light: &[f64], radiance: &mut Vec<f64>) {
 }
 
 impl Hull {
-    /// The hull of stacks given as reflectance rows of `space` (1/sr), with the price of each in units of squared distance.
-    /// Prices decide ties; 0 for none. `light` is the weight of the distance in light beside that of eqs. 2-3, which is all
-    /// there is if it is 0 or the space has no half angles.
+    /// The hull of stacks given as reflectance rows of `space` (1/sr), with the price of each in units of
+    /// squared distance. Prices decide ties; 0 for none. `light` is the weight of the distance in light
+    /// beside that of eqs. 2-3, which is all there is if it is 0 or the space has no half angles.
     pub fn new(space: &Space, curves: &Table, price: &[f64], light: f64) -> Result<Hull, MixtureError> {
         let m = space.columns();
         if curves.is_empty() {
@@ -143,7 +174,7 @@ impl Hull {
         let hue = if light_of_radiance.is_empty() { None } else { Hue::new(space, weight.len()) };
         if hue.is_some() {
             // Hue is compared by itself.
-            weight.extend([0.0; 3]);
+            weight.extend([0.0; COLUMNS]);
         }
         // Columns of no weight, so that the loops over them have no rest.
         weight.resize(weight.len().next_multiple_of(LANES), 0.0);
@@ -159,22 +190,27 @@ impl Hull {
                 radiance.push(f * c);
                 brightest = brightest.max(f * c);
             }
-            let dark = hue.as_ref().map(|hue| hue.mean(&radiance));
+            let dark = hue.as_ref().map(|hue| hue.columns(hue.mean(&radiance), in_places(SMALL)));
             append_albedo(&light_of_radiance, &mut radiance);
             radiance.extend(dark.into_iter().flatten());
             radiance.resize(weight.len(), 0.0);
             rows.push(&radiance);
         }
         let darkest = DARKEST * if brightest > 0.0 { brightest } else { 1.0 };
+        let darkest = darkest.max(f64::MIN_POSITIVE);
+        let (looks, sizes) = looks(&rows, &weight, darkest);
         Ok(Hull {
             radiance: space.radiance().to_vec(),
+            grain: if light_of_radiance.is_empty() { 0.0 } else { GRAIN },
             light: light_of_radiance,
             hue,
             weight,
             by_column: Columns::of_rows(&rows),
             rows,
             price: price.to_vec(),
-            darkest: darkest.max(f64::MIN_POSITIVE),
+            darkest,
+            looks,
+            sizes,
         })
     }
 
@@ -183,32 +219,52 @@ impl Hull {
         let mut rows = Table::new(self.rows.columns());
         stacks.iter().for_each(|&k| rows.push(self.rows.row(k)));
         let price = stacks.iter().map(|&k| self.price[k]).collect();
-        let by_column = Columns::of_rows(&rows);
-        let (radiance, light, hue) = (self.radiance.clone(), self.light.clone(), self.hue.clone());
+        let (looks, sizes) = looks(&rows, &self.weight, self.darkest);
         Hull {
-            radiance,
-            light,
-            hue,
+            radiance: self.radiance.clone(),
+            light: self.light.clone(),
+            hue: self.hue.clone(),
             weight: self.weight.clone(),
-            by_column,
+            by_column: Columns::of_rows(&rows),
             rows,
             price,
             darkest: self.darkest,
+            looks,
+            sizes,
+            grain: self.grain,
         }
     }
 
-    /// The same without hue in the dark.
-    #[cfg(test)]
-    pub(crate) fn blind_to_hue(self) -> Hull {
-        self.with_hue([0.0, 1.0, 1.0])
+    /// The same stacks in clusters of so many dots each, of which those of a new hull have [`SMALL`].
+    pub(crate) fn in_clusters(mut self, dots: &[f64]) -> Hull {
+        if let Some(hue) = &self.hue {
+            let mut rows = Table::new(self.rows.columns());
+            for (row, &dots) in self.rows.rows().zip(dots) {
+                let mut row = row.to_vec();
+                let columns = hue.columns(std::array::from_fn(|c| row[hue.first + c]), in_places(dots));
+                row[hue.first..][..COLUMNS].copy_from_slice(&columns);
+                rows.push(&row);
+            }
+            self.by_column = Columns::of_rows(&rows);
+            self.rows = rows;
+        }
+        self
     }
 
-    /// The same with multiples of the weight of hue, of the light at which it counts half, and of what is added before it is compared.
+    /// The same where hue has no price.
+    pub(crate) fn without_hue(self) -> Hull {
+        Hull { hue: None, ..self }
+    }
+
+    /// The same with multiples of the constants of hue, in their order, and of the price of grain; in
+    /// clusters of [`SMALL`] dots.
     #[cfg(test)]
-    pub(crate) fn with_hue(mut self, times: [f64; 3]) -> Hull {
+    pub(crate) fn with_constants(mut self, times: [f64; 5]) -> Hull {
         let constants = self.hue.iter_mut().flat_map(|hue| &mut hue.constants);
         constants.zip(times).for_each(|(constant, times)| *constant *= times);
-        self
+        self.grain *= times[4];
+        let dots = vec![SMALL; self.len()];
+        self.in_clusters(&dots)
     }
 
     /// Number of stacks.
@@ -275,23 +331,38 @@ impl Hull {
         }
     }
 
-    /// The distance between a mixture and a target, with light and hue in the dark.
-    pub(crate) fn distance(&self, weights: &[f64], target: &Target) -> f64 {
-        let mut mix = vec![0.0; self.columns()];
-        self.mix(weights, &mut mix);
-        let mut sum = 0.0;
-        for ((w, &f), root) in self.weight.iter().zip(&mix).zip(&target.root) {
-            let f = f.max(self.darkest);
-            let r = inverse_cbrt(f);
-            let d = w * (f * r * r - root);
-            sum += d * d;
+    /// Whether a mixture keeps the hue of a target in the dark, as far as people would call it the same.
+    pub(crate) fn keeps_hue(&self, weights: &[f64], target: &Target) -> bool {
+        let (Some(hue), Some(aim)) = (&self.hue, &target.hue) else { return true };
+        let mut mean = [0.0; 3];
+        for (row, &w) in self.rows.rows().zip(weights).filter(|(_, w)| **w > 0.0) {
+            mean.iter_mut().zip(&row[hue.first..]).for_each(|(mean, f)| *mean += w * f);
         }
-        if let (Some(hue), Some(aim)) = (&self.hue, &target.hue) {
-            let (mut missed, mut pull) = ([0.0; 3], [0.0; 3]);
-            aim.compare(std::array::from_fn(|c| mix[hue.first + c]), &mut missed, &mut pull);
-            sum += missed.iter().map(|m| m * m).sum::<f64>();
+        hue.is_kept(aim, mean)
+    }
+
+    /// The squared distance of every stack by itself from a target, light included.
+    #[inline(always)]
+    pub(super) fn apart(&self, target: &Target, wanted: &mut [f64], out: &mut [f64]) {
+        let mut size = 0.0;
+        for ((wanted, root), weight) in wanted.iter_mut().zip(&target.root).zip(&self.weight) {
+            *wanted = root * weight;
+            size += *wanted * *wanted;
         }
-        sum.sqrt()
+        self.looks.multiply(wanted, out);
+        for (out, own) in out.iter_mut().zip(&self.sizes) {
+            let squared = own + size - 2.0 * *out;
+            *out = if squared > 0.0 { squared } else { 0.0 };
+        }
+    }
+
+    /// What each stack adds to the square under the root of the objective, by its share, given how far it
+    /// is from the target by itself: grain and its price.
+    #[inline(always)]
+    pub(super) fn costs(&self, apart: &[f64], out: &mut [f64]) {
+        for ((out, apart), price) in out.iter_mut().zip(apart).zip(&self.price) {
+            *out = self.grain * apart + price;
+        }
     }
 
     /// The reflected radiance of a mixture.
@@ -304,4 +375,23 @@ impl Hull {
             }
         }
     }
+}
+
+/// The weighted cube roots of stacks by column, and the square of the length of each.
+fn looks(rows: &Table, weight: &[f64], darkest: f64) -> (Columns, Vec<f64>) {
+    let mut looks = Table::new(rows.columns());
+    let mut sizes = Vec::new();
+    for row in rows.rows() {
+        let look: Vec<f64> = row.iter().zip(weight).map(|(&f, w)| w * root_of(f.max(darkest))).collect();
+        sizes.push(look.iter().map(|v| v * v).sum());
+        looks.push(&look);
+    }
+    (Columns::of_rows(&looks), sizes)
+}
+
+/// The cube root of a normal positive number.
+#[inline(always)]
+fn root_of(f: f64) -> f64 {
+    let r = inverse_cbrt(f);
+    f * r * r
 }

@@ -1,22 +1,26 @@
 //! Equation 1: the mixture of printable stacks that looks most like a target.
 //!
-//! Problem: minimise `E(a) = sum_j W_j^2 (cbrt((Aa)_j) - cbrt(t_j))^2 + p'a` over the simplex, where the rows of A
-//! are the stacks' reflected radiances, t is the target's, W are the metric's weights and p is a small price of each stack
-//! that breaks ties toward fewer layers. The albedos may be further columns ([`Hull::new`]), beside hue in the dark
-//! ([`super::hue`]).
-//! Method: sequential quadratic steps. At a, the metric is replaced by its Gauss-Newton model, with the exact second
-//! derivative where that is positive. [`Simplex`] minimises the model exactly over the stacks in use and those whose
-//! gradient shows that they would help; Armijo's rule halves the step. The search ends when the gap is small enough or the
-//! objective falls by less than 1e-12 of itself. Every step computes the gradient of all stacks; only half a dozen enter
-//! the quadratic.
-//! Cost: K m multiplications per step for the gradient (K stacks, m columns), about 5 steps from the tangent start and 2
-//! from a neighbour's solution; no allocation. Limits: E is convex where no sample of the mixture exceeds 8 times the
-//! target. There the gap bounds the error; elsewhere several starts are the only assurance.
+//! Problem: minimise `F(a) = sqrt(E + g + p'a) + mu H(u)` over the simplex, what an eye sees in one unit.
+//! `E(a) = sum_j W_j^2 (cbrt((Aa)_j) - cbrt(t_j))^2`, where the rows of A are the stacks' reflected
+//! radiances, t is the target's and W are the metric's weights; the albedos may be further columns
+//! ([`Hull::new`]). `g = eta sum_k a_k D_k^2` is grain, `u` hue in the dark and its own grain
+//! ([`super::hue`]), and p a small price of each stack that breaks ties toward fewer layers. Without a
+//! weight for light E is all there is.
+//! Method: sequential quadratic steps. At a, S being the root there, `2 S F` is replaced by the
+//! Gauss-Newton model of E, with the exact second derivative where that is positive, the linear terms, and
+//! the quadratic that touches the price of hue and lies above it. [`Simplex`] minimises the model exactly
+//! over the stacks in use and those whose gradient shows that they would help; Armijo's rule on F halves
+//! the step. The search ends when the gap is small enough or F falls by less than 1e-12 of itself. Every
+//! step computes the gradient of all stacks; only half a dozen enter the quadratic.
+//! Cost: K m multiplications per step for the gradient and as many for the grain of a target (K stacks, m
+//! columns), about 5 steps from the tangent start and 2 from a neighbour's solution; no allocation. Limits:
+//! E is convex where no sample of the mixture exceeds 8 times the target. There the gap bounds the error of
+//! all but hue; elsewhere several starts are the only assurance.
 //! Source: eq. 1 of the 2009 paper (section 4.1) with the metric of its appendix.
 
 use super::gram::Gram;
-use super::hue::Missed;
-use super::hull::{DARKEST, Hull, MixtureError, Target};
+use super::hue::{COLUMNS, Missed};
+use super::hull::{DARKEST, Hull, MixtureError, Target, seen_of_share};
 use super::root::inverse_cbrt;
 use super::simplex::{Simplex, SimplexError, frank_wolfe_gap};
 use super::vector::{add_scaled, dot};
@@ -30,8 +34,13 @@ const MOST_STEPS: u32 = 100;
 /// Halvings of a step before the search gives up: after 30 it is a billionth, which cannot change the result
 /// visibly.
 const MOST_HALVINGS: u32 = 30;
-/// The most stacks that join the mixture in one step: most of those that seem to help do so no longer once the best have moved.
+/// The most stacks that join the mixture in one step: most of those that seem to help do so no longer once
+/// the best have moved.
 const MOST_JOINING: usize = 3;
+/// The gap, in squared distance, that a start may have: a start need not be more exact than what it starts.
+const START: f64 = 1e-6;
+/// The price of hue from which a second start is tried: a tenth of what is barely visible.
+const HUE_SEEN: f64 = 1e-3;
 /// Two starts agree if their distances differ by less than this: a ten-thousandth of what is barely visible,
 /// as much as is measured in decisions/gauss-newton-on-the-simplex.md.
 const AGREEMENT: f64 = 1e-6;
@@ -39,18 +48,48 @@ const AGREEMENT: f64 = 1e-6;
 /// How good a mixture is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
-    /// Distance between mixture and target in the metric of the hull, with light and hue in the dark.
+    /// What decides, in the unit of the metric: F without the price of layers.
+    pub objective: f64,
+    /// Distance between mixture and target in the metric of the hull, with light.
     pub distance: f64,
     /// The part of it that eqs. 2-3 see: distance d.
     pub curve: f64,
-    /// Frank-Wolfe gap in squared distance: where E is convex, no mixture has a value of `d^2 + p'a` lower by more than this.
-    /// With hue in the dark, which is not convex, that holds for all the rest if the search went as far as possible; otherwise
-    /// it says how nearly the search was done.
+    /// The part of the objective that is the price of hue.
+    pub hue: f64,
+    /// Frank-Wolfe gap in squared distance: where E is convex, no mixture has a value of `E + g + p'a`
+    /// lower by more than this. With hue in the dark, which is not convex, that holds for all the rest if
+    /// the search went as far as possible; otherwise it says how nearly the search was done.
     pub gap: f64,
     /// Steps taken.
     pub steps: u32,
     /// No sample of the mixture exceeds 8 times the target, so E is convex around it and the gap is a bound.
     pub convex: bool,
+}
+
+/// The objective at a mixture.
+#[derive(Clone, Copy, Debug, Default)]
+struct Value {
+    /// E, and with it what stacks cost: the square under the root.
+    squared: f64,
+    all: f64,
+    /// The price of hue.
+    missed: f64,
+}
+
+impl Value {
+    fn root(self) -> f64 {
+        self.all.max(f64::MIN_POSITIVE).sqrt()
+    }
+
+    fn objective(self) -> f64 {
+        self.root() + self.missed
+    }
+
+    /// How much lower the objective is elsewhere, times 2 S: about the drop of the square.
+    fn drop_to(self, other: Value) -> f64 {
+        let (here, there) = (self.root(), other.root());
+        2.0 * here * ((self.all - other.all) / (here + there) + self.missed - other.missed)
+    }
 }
 
 /// The best mixture over several starts.
@@ -62,7 +101,7 @@ pub struct Best {
     pub fit: Fit,
     /// Starts tried.
     pub starts: usize,
-    /// How many starts reached the same distance within 1e-6.
+    /// How many starts reached the same objective within 1e-6.
     pub agreeing: usize,
 }
 
@@ -85,6 +124,11 @@ pub struct Mixer {
     hue: Missed,
     /// Half the gradient, one value per stack.
     slope: Vec<f64>,
+    /// The squared distance of every stack by itself, and what each costs by its share.
+    apart: Vec<f64>,
+    cost: Vec<f64>,
+    /// The root S that the quadratic belongs to.
+    root: f64,
     /// Whether each stack is excluded.
     closed: Vec<bool>,
     /// The stacks of the quadratic, and their stiffness-scaled rows, slopes and weights.
@@ -92,6 +136,8 @@ pub struct Mixer {
     scaled: Vec<f64>,
     working_slope: Vec<f64>,
     working_weights: Vec<f64>,
+    /// Another mixture.
+    other: Vec<f64>,
 }
 
 impl Default for Mixer {
@@ -115,11 +161,15 @@ impl Mixer {
             stiffness: Vec::new(),
             hue: Missed::default(),
             slope: Vec::new(),
+            apart: Vec::new(),
+            cost: Vec::new(),
+            root: 0.0,
             closed: Vec::new(),
             working: Vec::new(),
             scaled: Vec::new(),
             working_slope: Vec::new(),
             working_weights: Vec::new(),
+            other: Vec::new(),
         }
     }
 
@@ -137,12 +187,14 @@ impl Mixer {
         ] {
             columns.resize(m, 0.0);
         }
-        self.slope.resize(k, 0.0);
+        for stacks in [&mut self.slope, &mut self.apart, &mut self.cost] {
+            stacks.resize(k, 0.0);
+        }
         self.scaled.resize(k * m, 0.0);
     }
 
-    /// The minimum over several starts: the tangent start, the linear start (least squares without the cube root), equal
-    /// weights, and the four nearest single stacks.
+    /// The minimum over several starts: the tangent start, the linear start (least squares without the cube
+    /// root), equal weights, and the four nearest single stacks.
     pub fn best(&mut self, hull: &Hull, target: &Target) -> Result<Best, MixtureError> {
         let k = hull.len();
         let mut starts = Vec::new();
@@ -157,23 +209,45 @@ impl Mixer {
             a[i] = 1.0;
             a
         };
-        let mut nearest: Vec<(f64, usize)> = (0..k).map(|i| (hull.distance(&single(i), target), i)).collect();
+        self.resize(hull);
+        hull.apart(target, &mut self.change, &mut self.apart);
+        let mut nearest: Vec<(f64, usize)> = self.apart.iter().copied().zip(0..).collect();
         nearest.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         starts.extend(nearest.iter().take(4).map(|&(_, i)| single(i)));
 
         let mut results = Vec::with_capacity(starts.len());
         for mut a in starts {
-            let fit = self.refine(hull, target, &mut a, 0.0)?;
-            let value = fit.distance * fit.distance + dot(&hull.price, &a);
+            let (fit, value) = self.descend(hull, target, &mut a, Reach::All, 0.0)?;
             results.push((value, fit, a));
         }
         let starts = results.len();
-        let least = results.iter().map(|(_, fit, _)| fit.distance).fold(f64::INFINITY, f64::min);
-        let agreeing = results.iter().filter(|(_, fit, _)| fit.distance - least < AGREEMENT).count();
+        let least = results.iter().map(|(value, ..)| *value).fold(f64::INFINITY, f64::min);
+        let agreeing = results.iter().filter(|(value, ..)| value - least < AGREEMENT).count();
         // Ties go to the earlier start. There is always at least one start, so the error cannot happen.
         let best = results.into_iter().reduce(|best, other| if other.0 < best.0 { other } else { best });
         let Some((_, fit, weights)) = best else { return Err(MixtureError::NoStacks) };
         Ok(Best { weights, fit, starts, agreeing })
+    }
+
+    /// The objective of a mixture, without the price of layers.
+    #[cfg(test)]
+    pub(crate) fn objective(&mut self, hull: &Hull, target: &Target, a: &[f64]) -> f64 {
+        self.resize(hull);
+        hull.apart(target, &mut self.change, &mut self.apart);
+        hull.costs(&self.apart, &mut self.cost);
+        hull.mix(a, &mut self.mix);
+        self.trial.copy_from_slice(&self.mix);
+        let grain = dot(&self.cost, a) - dot(&hull.price, a);
+        self.linearise(hull, target, grain).objective()
+    }
+
+    /// The objective of a mixture of the last target that was fitted, with the grain that an eye sees of
+    /// each share, rare ones most.
+    pub(crate) fn exactly(&mut self, hull: &Hull, target: &Target, a: &[f64]) -> f64 {
+        hull.mix(a, &mut self.mix);
+        self.trial.copy_from_slice(&self.mix);
+        let grain: f64 = a.iter().zip(&self.apart).map(|(&w, apart)| w * apart * seen_of_share(w)).sum();
+        self.linearise(hull, target, grain).objective()
     }
 
     /// The tangent start: least squares in the tangent of the metric at the target.
@@ -204,8 +278,8 @@ impl Mixer {
     ) -> Result<(), MixtureError> {
         check(hull, target, a)?;
         self.resize(hull);
-        let (k, m) = (hull.len(), hull.columns());
-        // The tangent at black is vertical: targets below a millionth of the brightest stack use the tangent there.
+        // The tangent at black is vertical: targets below a millionth of the brightest stack use the
+        // tangent there.
         let floor = hull.darkest / DARKEST * 1e-6;
         for (j, s) in self.stiffness.iter_mut().enumerate() {
             let root = inverse_cbrt(target.radiance[j].max(floor));
@@ -213,24 +287,32 @@ impl Mixer {
                 Linear::Tangent => hull.weight[j] * root * root / 3.0,
                 Linear::Plain => hull.weight[j],
             };
-            self.pull[j] = target.radiance[j] * *s;
         }
-        for i in 0..k {
-            let scaled = &mut self.scaled[i * m..][..m];
-            for ((x, f), s) in scaled.iter_mut().zip(hull.rows.row(i)).zip(&self.stiffness) {
-                *x = f * s;
-            }
-            self.slope[i] = dot(scaled, &self.pull);
-        }
-        let scaled = &self.scaled;
-        self.gram.refill(k, |i| &scaled[i * m..][..m]);
+        hull.apart(target, &mut self.change, &mut self.apart);
+        let nearest = (0..a.len()).min_by(|&i, &k| self.apart[i].total_cmp(&self.apart[k]));
         a.fill(0.0);
-        self.simplex.solve(&self.gram, &self.slope, a)?;
+        a[nearest.ok_or(MixtureError::NoStacks)?] = 1.0;
+        self.closed.clear();
+        self.closed.resize(a.len(), false);
+        self.cost.fill(0.0);
+        for _ in 0..MOST_STEPS {
+            hull.mix(a, &mut self.mix);
+            let columns = self.pull.iter_mut().zip(&self.mix).zip(&target.radiance).zip(&self.stiffness);
+            columns.for_each(|(((pull, f), t), s)| *pull = (f - t) * s * s);
+            self.price(hull);
+            if 2.0 * frank_wolfe_gap(&self.slope, a) <= START {
+                break;
+            }
+            self.choose(a);
+            self.scale_working(hull);
+            self.solve_scaled(hull.columns(), a)?;
+            self.working.iter().zip(&self.working_weights).for_each(|(&k, &w)| a[k] = w);
+        }
         Ok(())
     }
 
-    /// Refines a start until the gap (in squared distance) is at most `enough`; 0 means as far as possible. `a` is the start,
-    /// a point of the simplex, and receives the weights.
+    /// Refines a start until the gap (in squared distance) is at most `enough`; 0 means as far as possible.
+    /// `a` is the start, a point of the simplex, and receives the weights.
     pub fn refine(
         &mut self,
         hull: &Hull,
@@ -238,7 +320,32 @@ impl Mixer {
         a: &mut [f64],
         enough: f64,
     ) -> Result<Fit, MixtureError> {
-        self.descend(hull, target, a, Reach::All, enough)
+        self.descend(hull, target, a, Reach::All, enough).map(|(fit, _)| fit)
+    }
+
+    /// Like [`Mixer::refine`], and where hue has a price that somebody may see, again from the tangent
+    /// start: hue makes the objective hollow in places. The better of both stays.
+    pub(crate) fn refine_beyond(
+        &mut self,
+        hull: &Hull,
+        target: &Target,
+        a: &mut [f64],
+        enough: f64,
+    ) -> Result<Fit, MixtureError> {
+        let fit = self.refine(hull, target, a, enough)?;
+        if fit.hue < HUE_SEEN {
+            return Ok(fit);
+        }
+        let mut other = std::mem::take(&mut self.other);
+        other.resize(a.len(), 0.0);
+        self.tangent(hull, target, &mut other)?;
+        let again = self.refine(hull, target, &mut other, enough)?;
+        let is_better = again.objective < fit.objective;
+        if is_better {
+            a.copy_from_slice(&other);
+        }
+        self.other = other;
+        Ok(if is_better { again } else { fit })
     }
 
     /// Like [`Mixer::refine`], but uses only the stacks that have weight in `a`; so does the gap.
@@ -249,9 +356,10 @@ impl Mixer {
         a: &mut [f64],
         enough: f64,
     ) -> Result<Fit, MixtureError> {
-        self.descend(hull, target, a, Reach::Support, enough)
+        self.descend(hull, target, a, Reach::Support, enough).map(|(fit, _)| fit)
     }
 
+    /// The fit, and F with the price of layers.
     fn descend(
         &mut self,
         hull: &Hull,
@@ -259,7 +367,7 @@ impl Mixer {
         a: &mut [f64],
         reach: Reach,
         enough: f64,
-    ) -> Result<Fit, MixtureError> {
+    ) -> Result<(Fit, f64), MixtureError> {
         wide(
             #[inline(always)]
             || self.descend_plainly(hull, target, a, reach, enough),
@@ -274,14 +382,17 @@ impl Mixer {
         a: &mut [f64],
         reach: Reach,
         enough: f64,
-    ) -> Result<Fit, MixtureError> {
+    ) -> Result<(Fit, f64), MixtureError> {
         check(hull, target, a)?;
         self.resize(hull);
         self.closed.clear();
         self.closed.extend(a.iter().map(|&w| matches!(reach, Reach::Support) && w <= 0.0));
+        hull.apart(target, &mut self.change, &mut self.apart);
+        hull.costs(&self.apart, &mut self.cost);
         hull.mix(a, &mut self.mix);
         self.trial.copy_from_slice(&self.mix);
-        let mut squared = self.linearise(hull, target);
+        let mut spent = dot(&self.cost, a);
+        let mut value = self.linearise(hull, target, spent);
         let mut steps = 0;
         let mut stalled = false;
 
@@ -294,22 +405,20 @@ impl Mixer {
             steps += 1;
             self.choose(a);
             self.solve_model(hull, target, a)?;
-            let (promised, priced) = self.full_step(hull, a);
-            let before = squared;
-            match self.search(hull, target, before, promised, priced) {
-                Some((length, value)) => {
-                    squared = value;
+            let (promised, costs) = self.full_step(hull, a);
+            match self.search(hull, target, (value, spent), promised, costs) {
+                Some((length, next)) => {
                     std::mem::swap(&mut self.mix, &mut self.trial);
                     for (&k, w) in self.working.iter().zip(&self.working_weights) {
                         a[k] = (a[k] + length * w).max(0.0);
                     }
-                    let drop = before - squared - length * priced;
-                    stalled = drop <= DROP * before;
+                    stalled = value.drop_to(next) <= DROP * value.all;
+                    (value, spent) = (next, spent + length * costs);
                 }
                 None => {
                     stalled = true;
                     self.trial.copy_from_slice(&self.mix);
-                    squared = self.linearise(hull, target);
+                    value = self.linearise(hull, target, spent);
                 }
             }
         };
@@ -320,15 +429,19 @@ impl Mixer {
         let convex = self.mix.iter().zip(&target.radiance).all(|(f, t)| *f <= 8.0 * t);
         let of_curve = &self.residual[..hull.curve_columns()];
         let curve = dot(of_curve, of_curve).sqrt();
-        Ok(Fit { distance: squared.sqrt(), curve, gap: gap.max(0.0), steps, convex })
+        let layers = dot(&hull.price, a);
+        let objective = Value { all: value.all - layers, ..value }.objective();
+        let (distance, gap) = (value.squared.sqrt(), gap.max(0.0));
+        Ok((Fit { objective, distance, curve, hue: value.missed, gap, steps, convex }, value.objective()))
     }
 
-    /// Half the gradient for every stack, its price included; closed stacks get one so large that they never join.
+    /// Half the gradient of 2 S F for every stack, what it costs included; closed stacks get one so large
+    /// that they never join.
     #[inline(always)]
     fn price(&mut self, hull: &Hull) {
         hull.by_column.multiply(&self.pull, &mut self.slope);
-        for (slope, price) in self.slope.iter_mut().zip(&hull.price) {
-            *slope += 0.5 * price;
+        for (slope, cost) in self.slope.iter_mut().zip(&self.cost) {
+            *slope += 0.5 * cost;
         }
         for (slope, &closed) in self.slope.iter_mut().zip(&self.closed) {
             if closed {
@@ -337,17 +450,19 @@ impl Mixer {
         }
     }
 
-    /// The gap of the part of the objective that is convex, at the mixture that was found: what a certificate can say.
+    /// The gap of the part of the objective that is convex, at the mixture that was found: what a
+    /// certificate can say.
     #[inline(always)]
     fn gap_without_hue(&mut self, hull: &Hull, a: &[f64]) -> f64 {
         let Some(hue) = &hull.hue else { return 0.0 };
-        self.pull[hue.first..][..3].fill(0.0);
+        self.pull[hue.first..][..COLUMNS].fill(0.0);
         self.price(hull);
         2.0 * frank_wolfe_gap(&self.slope, a)
     }
 
-    /// Minimises the quadratic model over the working stacks; `working_weights` receives their weights. Its curvature is
-    /// Gauss-Newton's times `(2 cbrt t - cbrt f) / cbrt f`, the exact second derivative, limited to 0.25..9.
+    /// Minimises the quadratic model over the working stacks; `working_weights` receives their weights. Its
+    /// curvature is Gauss-Newton's times `(2 cbrt t - cbrt f) / cbrt f`, the exact second derivative,
+    /// limited to 0.25..9.
     #[inline(always)]
     fn solve_model(&mut self, hull: &Hull, target: &Target, a: &[f64]) -> Result<(), SimplexError> {
         let m = hull.columns();
@@ -360,15 +475,31 @@ impl Mixer {
             let exact = if exact < 9.0 { exact } else { 9.0 };
             stiffness[j] = weight[j] * (r * r) * (1.0 / 3.0) * exact.sqrt();
         }
+        self.scale_working(hull);
+        if let Some(hue) = &hull.hue {
+            for (i, &k) in self.working.iter().enumerate() {
+                let from = &hull.rows.row(k)[hue.first..][..3];
+                self.hue.scale(self.root, from, &mut self.scaled[i * m + hue.first..][..3]);
+            }
+        }
+        self.solve_scaled(m, a)
+    }
+
+    /// Multiplies the rows of the working stacks by the stiffness of each column.
+    #[inline(always)]
+    fn scale_working(&mut self, hull: &Hull) {
+        let m = hull.columns();
         for (i, &k) in self.working.iter().enumerate() {
             let scaled = &mut self.scaled[i * m..][..m];
             for ((x, f), s) in scaled.iter_mut().zip(hull.rows.row(k)).zip(&self.stiffness) {
                 *x = f * s;
             }
-            if let Some(hue) = &hull.hue {
-                self.hue.scale(&hull.rows.row(k)[hue.first..][..3], &mut scaled[hue.first..][..3]);
-            }
         }
+    }
+
+    /// Minimises the quadratic of the scaled rows, given half its gradient at `a`.
+    #[inline(always)]
+    fn solve_scaled(&mut self, m: usize, a: &[f64]) -> Result<(), SimplexError> {
         let scaled = &self.scaled;
         self.gram.refill(self.working.len(), |i| &scaled[i * m..][..m]);
         self.working_slope.clear();
@@ -379,8 +510,9 @@ impl Mixer {
         Ok(())
     }
 
-    /// Turns `working_weights` into the full step from `a`, and sets the change of the mixture along it. Returns the
-    /// decrease the gradient promises (negative) and the change in price, both for the full step.
+    /// Turns `working_weights` into the full step from `a`, and sets the change of the mixture along it.
+    /// Returns the decrease of 2 S F the gradient promises (negative) and the change in what stacks cost,
+    /// both for the full step.
     #[inline(always)]
     fn full_step(&mut self, hull: &Hull, a: &[f64]) -> (f64, f64) {
         self.change.fill(0.0);
@@ -392,30 +524,30 @@ impl Mixer {
                 add_scaled(&mut self.change, *w, hull.rows.row(k));
             }
         }
-        let priced = self.working.iter().zip(&self.working_weights).map(|(&k, w)| w * hull.price[k]).sum();
-        (promised, priced)
+        let costs = self.working.iter().zip(&self.working_weights).map(|(&k, w)| w * self.cost[k]).sum();
+        (promised, costs)
     }
 
-    /// Halves the step until the objective falls enough (Armijo's rule). Returns the share of the full step taken and the
-    /// squared distance there, or `None` if no share helps.
+    /// Halves the step until the objective falls enough (Armijo's rule). Returns the share of the full step
+    /// taken and the objective there, or `None` if no share helps.
     #[inline(always)]
     fn search(
         &mut self,
         hull: &Hull,
         target: &Target,
-        before: f64,
+        (value, spent): (Value, f64),
         promised: f64,
-        priced: f64,
-    ) -> Option<(f64, f64)> {
+        costs: f64,
+    ) -> Option<(f64, Value)> {
         let mut length = 1.0;
         for _ in 0..MOST_HALVINGS {
             for ((trial, mix), change) in self.trial.iter_mut().zip(&self.mix).zip(&self.change) {
                 *trial = mix + length * change;
             }
             // This also sets up the model of the next step, so an accepted mixture is evaluated only once.
-            let squared = self.linearise(hull, target);
-            if squared + length * priced <= before + 1e-4 * length * promised.min(0.0) {
-                return Some((length, squared));
+            let next = self.linearise(hull, target, spent + length * costs);
+            if value.drop_to(next) >= -1e-4 * length * promised.min(0.0) {
+                return Some((length, next));
             }
             length *= 0.5;
         }
@@ -439,10 +571,10 @@ impl Mixer {
         self.working.extend((0..a.len()).filter(|&k| a[k] > 0.0 || joins(k)));
     }
 
-    /// Returns the squared distance of the trial mixture and sets up what the gradient and the model there need: `inverse`,
-    /// `residual` and `pull`.
+    /// Returns the objective of the trial mixture, whose stacks cost so much, and sets up what the gradient
+    /// and the model there need: `inverse`, `residual`, `pull`, `hue` and `root`.
     #[inline(always)]
-    fn linearise(&mut self, hull: &Hull, target: &Target) -> f64 {
+    fn linearise(&mut self, hull: &Hull, target: &Target, spent: f64) -> Value {
         let m = self.trial.len();
         let (mix, t, weight) = (&self.trial[..m], &target.root[..m], &hull.weight[..m]);
         let pull = &mut self.pull[..m];
@@ -460,11 +592,15 @@ impl Mixer {
             let tangent = weight[j] * r2 * (1.0 / 3.0);
             pull[j] = residual[j] * tangent;
         }
+        let squared = dot(residual, residual);
+        let mut value = Value { squared, all: squared + spent, missed: 0.0 };
+        self.root = value.root();
         if let (Some(hue), Some(aim)) = (&hull.hue, &target.hue) {
-            let dark = std::array::from_fn(|c| mix[hue.first + c]);
-            self.hue = aim.compare(dark, &mut residual[hue.first..][..3], &mut pull[hue.first..][..3]);
+            self.hue = hue.compare(aim, &mix[hue.first..][..COLUMNS]);
+            self.hue.pull(self.root, &mut pull[hue.first..][..COLUMNS]);
+            value.missed = self.hue.price;
         }
-        dot(residual, residual)
+        value
     }
 }
 

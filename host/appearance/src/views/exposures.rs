@@ -1,8 +1,9 @@
 //! Two exposures of one picture with more light than white: what an HDR print shows in its two views.
 //!
-//! Method: straight on the print shows the exposure that gives the logarithmic mean of the luminance 18 % (Reinhard et al. 2002,
-//! equations 1 and 2), whose lights are burnt out. In the reflection it shows the one at which the brightest thousandth begins to
-//! burn out, whose shadows are black. Between the two the print mixes them, so its exposure changes with the tilt.
+//! Method: straight on the print shows the exposure that gives the logarithmic mean of the luminance 18 %
+//! (Reinhard et al. 2002, equations 1 and 2), whose lights are burnt out. In the reflection it shows the
+//! one at which the brightest thousandth begins to burn out, whose shadows are black. Between the two the
+//! print mixes them, so its exposure changes with the tilt.
 //! Limits: two exposures, clipped; no local tone mapping.
 
 use maths::Maths;
@@ -46,14 +47,14 @@ impl Exposures {
 mod tests {
     use super::*;
 
-    /// The part that may burn out moved by a fifth moves the short exposure by less than a third of a stop, the step of cameras, in
-    /// measured panoramas, whose sun or lamps cover more or less than that.
+    /// The part that may burn out moved by a fifth moves the short exposure by less than a third of a stop,
+    /// the step of cameras, in measured panoramas, whose sun or lamps cover more or less than that.
     #[test]
     fn the_part_that_may_burn_out_hardly_matters() {
         let Some(data) = testing::needs::data() else { return };
         for name in ["studio.hdr", "venice.hdr"] {
             let picture = image::open(data.join("env").join(name)).unwrap().into_rgb32f();
-            let luminance = |p: &image::Rgb<f32>| crate::views::luminance(p.0.map(f64::from));
+            let luminance = |p: &image::Rgb<f32>| crate::srgb::luminance(p.0.map(f64::from));
             let luminance: Vec<f64> = picture.pixels().map(luminance).collect();
             let stops = [0.8, 1.0, 1.2]
                 .map(|factor| Exposures::burning(&luminance, factor * BURNT).unwrap().short.log2());

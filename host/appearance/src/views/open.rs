@@ -7,7 +7,7 @@ use observe::Observer;
 use rayon::prelude::*;
 
 use super::exposures::Exposures;
-use super::reach::{Reach, luminance, reach};
+use super::reach::{Reach, reach};
 use super::{FAINTEST, Views};
 use crate::brdf::{Space, Table};
 use crate::document::MOST_BYTES;
@@ -17,9 +17,11 @@ use crate::document::texture::{Plane, same_shape};
 use crate::document::{ColourSpace, Content, Document, DocumentError, name_of};
 use crate::gamut::Printable;
 use crate::materials::Factored;
+use crate::srgb::luminance;
 use crate::weights::{WeightError, WeightMaps, quantise};
 
-/// The most pixels of the document: what the largest page shows at a cluster of two dots. Finer pictures are averaged.
+/// The most pixels of the document: what the largest page shows at a cluster of two dots. Finer pictures
+/// are averaged.
 const MOST_PIXELS: usize = 1 << 23;
 
 /// Channels that differ by no more than one step of 8 bits are grey, for rounding makes as much.
@@ -286,7 +288,8 @@ fn grid(a: &Seen, b: &Seen) -> (usize, usize) {
     (side(width), side(height))
 }
 
-/// Bases and maps: the corners of the limits, each as much as both pictures are near to it; and what each basis shows.
+/// Bases and maps: the corners of the limits, each as much as both pictures are near to it; and what each
+/// basis shows.
 fn factored(
     straight: &Seen,
     highlight: &Seen,

@@ -1,16 +1,18 @@
 //! How bright and dark a print can be in one view, whatever it is in the other.
 //!
-//! Problem: mixtures of stacks fill a convex polygon in the plane of (luminance straight on, luminance in the reflection).
-//! Pictures that do not disturb each other need a rectangle in it: each of the four pairs of dark and bright.
-//! Method: the boundary below is convex and the one above concave, so a rectangle over an interval fits if it fits at both ends. All
-//! intervals of a grid of [`STEPS`] lightnesses are tried, and the one is taken in which the product of both contrasts is largest:
-//! neither picture gains a tenth where the other loses more. Corners are mixtures of at most four stacks: two of the boundary
-//! below, two of the one above.
-//! Cost: `STEPS^2 / 2` comparisons, a sort of the stacks. Limits: exact up to the step of the grid, 1 / 256 of the range in
-//! lightness; only neutral stacks are used, so that no picture is tinted by the other.
+//! Problem: mixtures of stacks fill a convex polygon in the plane of (luminance straight on, luminance in
+//! the reflection). Pictures that do not disturb each other need a rectangle in it: each of the four pairs
+//! of dark and bright.
+//! Method: the boundary below is convex and the one above concave, so a rectangle over an interval fits if
+//! it fits at both ends. All intervals of a grid of [`STEPS`] lightnesses are tried, and the one is taken
+//! in which the product of both contrasts is largest: neither picture gains a tenth where the other loses
+//! more. Corners are mixtures of at most four stacks: two of the boundary below, two of the one above.
+//! Cost: `STEPS^2 / 2` comparisons, a sort of the stacks. Limits: exact up to the step of the grid, 1 / 256
+//! of the range in lightness; only neutral stacks are used, so that no picture is tinted by the other.
 
 use crate::brdf::Space;
 use crate::gamut::Printable;
+use crate::srgb::luminance;
 use maths::Maths;
 
 use super::{REFLECTION, STRAIGHT, contrast};
@@ -18,7 +20,8 @@ use super::{REFLECTION, STRAIGHT, contrast};
 /// Lightnesses of the grid.
 const STEPS: usize = 256;
 
-/// The largest difference of channels, in parts of the brightest, of a stack that counts as neutral; the darkest ones always do.
+/// The largest difference of channels, in parts of the brightest, of a stack that counts as neutral; the
+/// darkest ones always do.
 const CHROMA: f64 = 0.3;
 
 /// A stack is dark, and its hue does not matter, below this part of the brightest.
@@ -56,12 +59,6 @@ impl Reach {
         }
         row
     }
-}
-
-/// The luminance of linear Rec. 709.
-#[must_use]
-pub fn luminance(rgb: [f64; 3]) -> f64 {
-    0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
 }
 
 /// The luminance of a row in both views.
@@ -143,7 +140,8 @@ pub fn reach(printable: &Printable, space: &Space) -> Option<Reach> {
     Some(Reach { straight, reflection, white: last, contrast, corners })
 }
 
-/// The convex boundary below the points (`side` 1) or above them (-1), from left to right (Andrew's monotone chain).
+/// The convex boundary below the points (`side` 1) or above them (-1), from left to right (Andrew's
+/// monotone chain).
 fn chain(points: &[(usize, [f64; 2])], side: f64) -> Vec<(usize, [f64; 2])> {
     let mut sorted = points.to_vec();
     sorted.sort_by(|(_, a), (_, b)| a[0].total_cmp(&b[0]).then((side * a[1]).total_cmp(&(side * b[1]))));
@@ -195,7 +193,8 @@ mod tests {
         sides.iter().all(|s| *s >= 0.0) || sides.iter().all(|s| *s <= 0.0)
     }
 
-    /// What is refused at the faintest contrast is refused at one a fifth lower or higher, whatever inks are at hand.
+    /// What is refused at the faintest contrast is refused at one a fifth lower or higher, whatever inks
+    /// are at hand.
     #[test]
     fn inks_show_both_pictures_or_hardly_anything() {
         let mut shown = [0, 0];

@@ -1,12 +1,14 @@
 //! A curve from a gloss meter and a spectrophotometer.
 //!
 //! Problem: these instruments give a few numbers, not a curve; the numbers are better than none.
-//! Method: one GGX lobe on a diffuse body. CIELAB at 45 degrees with the eye at the normal is the reflectance at a half angle
-//! of 22.5 degrees; the body is what the lobe leaves of it there. The width of the lobe is the one that reads the same gloss
-//! ([`inks::gloss`]). Samples carry the standard deviation that follows from a unit of CIELAB and from how well the
-//! readings agree. Cost: some hundred gloss integrals, milliseconds.
-//! Limits: the shape is assumed, so such a curve is predicted, not measured. Spectrophotometers with a sphere include the gloss;
-//! their values are too light. Metal needs its reflectance from elsewhere: gloss cannot tell it from the width.
+//! Method: one GGX lobe on a diffuse body. CIELAB at 45 degrees with the eye at the normal is the
+//! reflectance at a half angle of 22.5 degrees; the body is what the lobe leaves of it there. The width of
+//! the lobe is the one that reads the same gloss ([`inks::gloss`]). Samples carry the standard deviation
+//! that follows from a unit of CIELAB and from how well the readings agree. Cost: some hundred gloss
+//! integrals, milliseconds.
+//! Limits: the shape is assumed, so such a curve is predicted, not measured. Spectrophotometers with a
+//! sphere include the gloss; their values are too light. Metal needs its reflectance from elsewhere: gloss
+//! cannot tell it from the width.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_8, PI};
 use std::path::Path;
@@ -60,10 +62,10 @@ pub struct FromReadings {
     pub words: String,
 }
 
-/// Reads a file of readings: `format = 1`, `lab`, at least one of `gloss_20`, `gloss_60` and `gloss_85`, and `f0` for metals.
+/// Reads a file of readings: `format = 1`, `lab`, at least one of `gloss_20`, `gloss_60` and `gloss_85`,
+/// and `f0` for metals.
 ///
-/// # Errors
-/// Files that cannot be read, unknown keys, and readings out of range.
+/// # Errors Files that cannot be read, unknown keys, and readings out of range.
 pub fn read(path: &Path) -> Result<FromReadings, MeasureError> {
     let io = |source| MeasureError::Io { path: path.to_path_buf(), source };
     let found = std::fs::metadata(path).map_err(io)?;
@@ -163,7 +165,7 @@ fn parse(text: &str, path: &Path) -> Result<FromReadings, MeasureError> {
         read.join(", "),
         width.alpha,
         100.0 * width.uncertainty,
-        0.2126 * f0[0] + 0.7152 * f0[1] + 0.0722 * f0[2]
+        appearance::srgb::luminance(f0)
     );
     Ok(FromReadings { curve, sigma, width, words })
 }

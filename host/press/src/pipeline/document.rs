@@ -1,7 +1,7 @@
 //! From a document to its dots: bases and weight maps, the mixture of stacks, the halftone.
 //!
-//! Nothing is decided here that a stage does not decide; this is only their order, and the values between them, kept
-//! for those who want to look.
+//! Nothing is decided here that a stage does not decide; this is only their order, and the values between
+//! them, kept for those who want to look.
 
 use std::borrow::Cow;
 
@@ -16,7 +16,7 @@ use appearance::materials::{Reduced, resolution};
 use appearance::weights::WeightError;
 use halftone::{HalftoneError, halftone};
 use observe::Observer;
-use protocol::ink::Ink;
+use protocol::ink::Kind;
 use sheet::Size;
 use sheet::{DOTS_PER_MM, DotMap};
 
@@ -29,6 +29,9 @@ pub struct Settings {
     pub gamut: gamut::GamutSettings,
     /// The inks at hand.
     pub inks: InkSet,
+    /// Inks that are held back until the owner names them, each kind by itself: what they would bring is
+    /// found.
+    pub held_back: InkSet,
     /// How dots are chosen.
     pub halftone: halftone::Method,
     /// Size on paper.
@@ -43,10 +46,10 @@ pub struct Halftoned {
     pub mapped: Mapped,
     /// The dots.
     pub dots: DotMap,
-    /// What foils would bring, if the inks are the default, which leaves them out.
-    pub foils: Option<Gain>,
-    /// How much of the distance between document and mixture lies within the measurement of the stacks, if one in use has
-    /// standard deviations.
+    /// What inks would bring that are held back, for each kind that would bring something.
+    pub held_back: Vec<Gain>,
+    /// How much of the distance between document and mixture lies within the measurement of the stacks, if
+    /// one in use has standard deviations.
     pub doubt: Option<DistanceUncertainty>,
 }
 
@@ -73,12 +76,11 @@ pub enum StageError {
     Halftone(#[from] HalftoneError),
 }
 
-/// Halftones a document at the size it will have on a page of this layout. Detail finer than a cluster of dots is averaged
-/// before anything is fitted to it.
+/// Halftones a document at the size it will have on a page of this layout. Detail finer than a cluster of
+/// dots is averaged before anything is fitted to it.
 ///
-/// # Errors
-/// Those of the stages; a size or a layout without room, and inks that the halftone cannot print, are refused before the long
-/// work.
+/// # Errors Those of the stages; a size or a layout without room, and inks that the halftone cannot print,
+/// are refused before the long work.
 pub fn halftoned(
     document: &Document,
     library: &Library,
@@ -124,6 +126,7 @@ pub fn halftoned(
     };
     let mapping = gamut::GamutSettings {
         eye: spot(width, materials.width(), settings.halftone),
+        hue: settings.gamut.hue && document.views.is_none(),
         ..settings.gamut.clone()
     };
     let mapped = gamut::map(materials, bases, &printable, &mapping, observer)?;
@@ -137,12 +140,19 @@ pub fn halftoned(
         ..halftone::Settings::from_library(&mapped.mix.stacks, library)
     };
     let dots = halftone(&mapped.mix, (width, height), None, &chosen, observer)?;
-    let foils = match settings.inks == InkSet::default() {
-        true => foils(materials, library, &printable, &mapped, &settings.gamut)?,
-        false => None,
-    };
+    let mut held_back = Vec::new();
+    for kind in [Kind::Primer, Kind::Foil] {
+        let of_kind = InkSet::of(settings.held_back.iter().filter(|ink| ink.kind() == kind));
+        if !of_kind.is_empty() {
+            // Beside the cartridges chosen.
+            let all = InkSet::of(mapped.report.cartridges.iter().copied().chain(of_kind.iter()));
+            let more = Printable::combined(library, &all, materials.space());
+            let judged = &mapped.judged;
+            held_back.extend(gamut::gain(judged, &printable, &more, materials.space(), &mapping)?);
+        }
+    }
     let doubt = gamut::distance_uncertainty(materials, &mapped.mix, library, settings.gamut.seed);
-    Ok(Halftoned { factoring, mapped, dots, foils, doubt })
+    Ok(Halftoned { factoring, mapped, dots, held_back, doubt })
 }
 
 /// The width of a pixel on paper from which a border between two is plainly soft.
@@ -159,27 +169,15 @@ fn is_one_material(materials: &dyn Materials) -> bool {
     (1..materials.width() * materials.height()).all(|pixel| row(pixel) == first)
 }
 
-/// Side in pixels of the spot that an eye averages over, if the dots are rearranged for the eye: then the mixtures are, too.
+/// Side in pixels of the spot that an eye averages over, if the dots are rearranged for the eye: then the
+/// mixtures are, too.
 fn spot(dots: u16, pixels: usize, method: halftone::Method) -> Option<f64> {
     let dots_per_pixel = f64::from(dots) / pixels as f64;
     (method == halftone::Method::Best).then(|| spot_mm(EYE) * DOTS_PER_MM / dots_per_pixel)
 }
 
-/// What foils beside the default inks would bring.
-fn foils(
-    materials: &dyn Materials,
-    library: &Library,
-    printable: &Printable,
-    mapped: &Mapped,
-    settings: &gamut::GamutSettings,
-) -> Result<Option<Gain>, GamutError> {
-    let all = InkSet::of(InkSet::default().iter().chain([Ink::SilverFoil, Ink::GoldFoil]));
-    let more = Printable::combined(library, &all, materials.space());
-    gamut::gain(&mapped.judged, printable, &more, materials.space(), settings)
-}
-
-/// The resolution that a print of so many dots has for a document of so many pixels, if it is less than the document's: a
-/// pixel for each cell of the smallest clusters.
+/// The resolution that a print of so many dots has for a document of so many pixels, if it is less than the
+/// document's: a pixel for each cell of the smallest clusters.
 fn cells(
     (width, height): (u16, u16),
     pixels: (usize, usize),

@@ -1,19 +1,22 @@
 //! How much of each of two pictures is seen in each of their two views, on the dots of a print.
 //!
-//! Problem: [`views`] keeps two pictures apart in the target; mapping, halftone and clusters may mix them again.
-//! Method: document and print are averaged over cells that the eye resolves. In each view the luminance of the print's cells is
-//! fitted by `c + p a + q b`, `a` and `b` the luminance of the pictures, 0 to 1 (least squares). The contrast of a picture is the
-//! difference in lightness, cube roots, between its white and its black where the other picture is as on average, under the
-//! white of the view: bare paper straight on, the brightest that the second picture shows in the reflection.
-//! Cost: one pass over the dots, 24 multiply-adds a cell. Limits: luminance alone; two pictures that resemble each other
-//! (correlation beyond [`ALIKE`]) cannot be told apart, and have no figures.
+//! Problem: [`views`] keeps two pictures apart in the target; mapping, halftone and clusters may mix them
+//! again.
+//! Method: document and print are averaged over cells that the eye resolves. In each view the luminance of
+//! the print's cells is fitted by `c + p a + q b`, `a` and `b` the luminance of the pictures, 0 to 1 (least
+//! squares). The contrast of a picture is the difference in lightness, cube roots, between its white and
+//! its black where the other picture is as on average, under the white of the view: bare paper straight on,
+//! the brightest that the second picture shows in the reflection.
+//! Cost: one pass over the dots, 24 multiply-adds a cell. Limits: luminance alone; two pictures that
+//! resemble each other (correlation beyond [`ALIKE`]) cannot be told apart, and have no figures.
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 use std::fmt;
 
 use appearance::factor::Factored;
-use appearance::views::{REFLECTION, STRAIGHT, Views, contrast, luminance};
+use appearance::srgb::luminance;
+use appearance::views::{REFLECTION, STRAIGHT, Views, contrast};
 use sheet::DOTS_PER_MM;
 
 use super::error::PreviewError;
@@ -26,7 +29,8 @@ const ALIKE: f64 = 0.99;
 /// The most cells across and down, for the memory's sake.
 const MOST_CELLS: usize = 256;
 
-/// The contrast of both pictures in both views: 1 from the black to the white of the view, negative if inverted.
+/// The contrast of both pictures in both views: 1 from the black to the white of the view, negative if
+/// inverted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contrasts {
     /// The names of the pictures.
@@ -156,7 +160,8 @@ mod tests {
 
     #[test]
     fn the_fit_finds_what_each_picture_does_to_each_view() {
-        // Two pictures that overlap in part; y = 0.02 + 0.1 a + 0.03 b straight on, 1 + 0 a + 5 b in the reflection.
+        // Two pictures that overlap in part; y = 0.02 + 0.1 a + 0.03 b straight on, 1 + 0 a + 5 b in the
+        // reflection.
         let pictures: Vec<[f64; 2]> =
             (0..64).map(|i| [f64::from(i % 8) / 7.0, f64::from((i / 8 + i % 8) % 5) / 4.0]).collect();
         let prints: Vec<[f64; 2]> =

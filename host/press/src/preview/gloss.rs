@@ -1,20 +1,18 @@
 //! Gloss of a document's materials and of their print, in the units of a gloss meter and in words.
 //!
 //! Problem: owners know 20, 60 and 85 degree readings, and nobody reads gloss from a distance d.
-//! Method: [`inks::gloss::of_curve`] reads the curves of target and print. Words follow ISO 2813, which measures at 85 degrees below
-//! 10 units at 60 degrees and at 20 degrees above 70. A target whose peak is below that of every stack at hand is matter than any ink.
-//! Cost: about 1 ms for each curve: one split, and 4096 evaluations a reading. Limits: those of [`inks::gloss::of_curve`]; two lobes over each other read up to
-//! 1.3 units less at 85 degrees.
+//! Method: [`inks::gloss::of_curve`] reads the curves of target and print. Words follow ISO 2813, which
+//! measures at 85 degrees below 10 units at 60 degrees and at 20 degrees above 70. A target whose peak is
+//! below that of every stack at hand is matter than any ink.
+//! Cost: about 1 ms for each curve: one split, and 4096 evaluations a reading. Limits: those of
+//! [`inks::gloss::of_curve`]; two lobes over each other read up to 1.3 units less at 85 degrees.
 
 use appearance::brdf::Space;
 use appearance::gamut::{MaterialReport, Printable};
-use inks::gloss::{Geometry, of_curve};
+use inks::gloss::{Geometry, of_curve, word};
 use serde::Serialize;
 
 const GEOMETRIES: [Geometry; 3] = [Geometry::TWENTY, Geometry::SIXTY, Geometry::EIGHTY_FIVE];
-/// Units at 60 degrees below which a surface is matt, and above which it is glossy (ISO 2813).
-const SATIN: [f64; 2] = [10.0, 70.0];
-
 /// Gloss of a material before and after mapping.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Gloss {
@@ -47,31 +45,23 @@ impl Gloss {
     }
 }
 
-/// "matt", "satin" or "glossy".
-fn word(units: [f64; 3]) -> &'static str {
-    match units[1] {
-        at if at < SATIN[0] => "matt",
-        at if at < SATIN[1] => "satin",
-        _ => "glossy",
-    }
-}
-
 /// Three readings and their word.
 pub fn in_words(units: [f64; 3]) -> String {
     let [a, b, c] =
         units.map(|units| if units < 9.95 { format!("{units:.1}") } else { format!("{units:.0}") });
-    format!("{a}, {b}, {c} ({})", word(units))
+    format!("{a}, {b}, {c} ({})", word(units[1]))
 }
 
-/// What there is to say of all materials, each with its share of the document: that of most of it, the glossiest, and what no ink
-/// can print.
+/// What there is to say of all materials, each with its share of the document: that of most of it, the
+/// glossiest, and what no ink can print.
 pub fn sentences(materials: &[(f64, Gloss)]) -> Vec<String> {
     let most = materials.iter().max_by(|a, b| a.0.total_cmp(&b.0));
     let glossiest = materials.iter().max_by(|a, b| a.1.target[1].total_cmp(&b.1.target[1]));
     let (Some(most), Some(glossiest)) = (most, glossiest) else { return Vec::new() };
     let pair = |gloss: &Gloss| format!("{}, in print {}", in_words(gloss.target), in_words(gloss.printed));
     let mut said = format!("gloss units at 20, 60 and 85 degrees: most of the document {}", pair(&most.1));
-    if word(glossiest.1.target) != word(most.1.target) || glossiest.1.target[1] > 1.5 * most.1.target[1] {
+    if word(glossiest.1.target[1]) != word(most.1.target[1]) || glossiest.1.target[1] > 1.5 * most.1.target[1]
+    {
         said.push_str(&format!("; the glossiest of it {}", pair(&glossiest.1)));
     }
     let mut said = vec![said];
@@ -151,7 +141,7 @@ mod tests {
     #[test]
     fn words_follow_the_reading_at_60_degrees() {
         for (at, said) in [(9.9, "matt"), (10.0, "satin"), (69.9, "satin"), (70.0, "glossy")] {
-            assert_eq!(word([0.0, at, 99.0]), said);
+            assert_eq!(word(at), said);
         }
         assert_eq!(in_words([1.25, 9.94, 45.4]), "1.2, 9.9, 45 (matt)");
     }

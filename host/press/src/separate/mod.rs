@@ -1,9 +1,10 @@
 //! A sheet as the fewest ordered one-bit passes, and what the rules say of them.
 //!
-//! Problem: a stack is several layers, a pass is one ink over the whole page, and a page should take few passes.
-//! Method: the shortest list of inks in which every stack in use finds its layers in order (`sheet::order`), one plane
-//! for each ([`pack`]), the rules on stacks and pages as checks (`rules`). Overlap is wanted: a dot is in as many passes as
-//! its stack has layers. [`compose`] is the way back.
+//! Problem: a stack is several layers, a pass is one ink over the whole page, and a page should take few
+//! passes.
+//! Method: the shortest list of inks in which every stack in use finds its layers in order
+//! (`sheet::order`), one plane for each ([`pack`]), the rules on stacks and pages as checks (`rules`).
+//! Overlap is wanted: a dot is in as many passes as its stack has layers. [`compose`] is the way back.
 //! Cost: one pass over the dots for all planes. Limits: `MOST_PASSES` passes, `MOST_LAYERS` layers.
 
 pub mod files;
@@ -21,7 +22,7 @@ use sheet::{MOST_PASSES, Plane, Sheet, SheetError, order, pack};
 
 pub(crate) use passes::MOST_LAYERS;
 pub use passes::{MOST_CARTRIDGES, Pass, Plan, Planned};
-pub use rules::{CARTRIDGES, Check};
+pub use rules::{CARTRIDGES, Check, Keeper, keepers};
 
 /// A sheet ready for the printer's language.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,8 +40,8 @@ pub struct Separation {
 }
 
 impl Separation {
-    /// Takes back what the checks say of stacks without a dot on the copies: marks are cut off. What must not be printed
-    /// stays so wherever it is.
+    /// Takes back what the checks say of stacks without a dot on the copies: marks are cut off. What must
+    /// not be printed stays so wherever it is.
     pub(crate) fn spare_marks(&mut self, on_copies: impl Fn(&Stack) -> bool) {
         self.checks.retain_mut(|check| {
             let all = check.stacks.len();
@@ -122,13 +123,12 @@ pub fn check(sheet: &Sheet, passes: &[Planned], rules: &[Rule]) -> Vec<Check> {
     rules::check(sheet, &sheet.census(), &plan, rules)
 }
 
-/// Separates a sheet into passes. Only stacks that occur on a dot count. `rules` are the ink library's rules on the
-/// order of layers ([`inks::Library::rules`]).
+/// Separates a sheet into passes. Only stacks that occur on a dot count. `rules` are the ink library's
+/// rules on the order of layers ([`inks::Library::rules`]).
 ///
 /// More than [`MOST_CARTRIDGES`] inks are planned, with a check that forbids to send them.
 ///
-/// # Errors
-/// More than `MOST_PASSES` passes or `MOST_LAYERS` layers.
+/// # Errors More than `MOST_PASSES` passes or `MOST_LAYERS` layers.
 pub fn separate(sheet: &Sheet, rules: &[Rule], observer: &dyn Observer) -> Result<Separation, SeparateError> {
     observer.begin("separate", 2);
     let census = sheet.census();
@@ -175,7 +175,8 @@ pub fn separate(sheet: &Sheet, rules: &[Rule], observer: &dyn Observer) -> Resul
     })
 }
 
-/// The passes that print these stacks: their inks, first printed first, and for each stack the bits of its passes.
+/// The passes that print these stacks: their inks, first printed first, and for each stack the bits of its
+/// passes.
 pub fn passes(stacks: &[Stack]) -> (Vec<Ink>, Vec<u16>) {
     let inks = order::order(&stacks.iter().map(Stack::layers).collect::<Vec<_>>()).inks;
     let bits = |stack: &Stack| {
@@ -186,11 +187,11 @@ pub fn passes(stacks: &[Stack]) -> (Vec<Ink>, Vec<u16>) {
     (inks, bits)
 }
 
-/// The sheet that passes print: each dot has the inks of the passes that have it, lowest first. `stacks` are the
-/// stacks to expect, numbered as the sheet will number them.
+/// The sheet that passes print: each dot has the inks of the passes that have it, lowest first. `stacks`
+/// are the stacks to expect, numbered as the sheet will number them.
 ///
-/// # Errors
-/// Planes of another size than the paper, more than `MOST_PASSES`, a dot with inks that are no stack.
+/// # Errors Planes of another size than the paper, more than `MOST_PASSES`, a dot with inks that are no
+/// stack.
 pub fn compose(paper: Paper, passes: &[Pass], stacks: &[Stack]) -> Result<Sheet, SeparateError> {
     let (width, length) = (usize::from(paper.width()), usize::from(paper.length()));
     if passes.len() > MOST_PASSES {

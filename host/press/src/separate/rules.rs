@@ -1,13 +1,13 @@
 //! What is known about pages that hold, show and do not jam the ribbon, as data.
 //!
-//! Problem: the printer prints anything; some pages disappoint. Knowledge is uneven, so each rule says how it is
-//! known, and how much it matters.
-//! Method: the rules on the order of layers in a stack are the ink library's ([`inks::Rule`]); `PAGE_RULES` is a
-//! table of conditions on what only the page knows: how small the dots are, how much an ink covers, what is used.
-//! `check` tries each. Nothing here changes the passes. Cost: negligible, except that rules on cluster size look at
-//! the whole page once for each ink concerned.
-//! Source: the vendor's guides, what owners have reported, the open driver's habits, and section 4.2 of the 2009 paper; each
-//! rule's certainty says which.
+//! Problem: the printer prints anything; some pages disappoint. Knowledge is uneven, so each rule says how
+//! it is known, how much it matters, and who can keep it ([`Keeper`]).
+//! Method: the rules on the order of layers in a stack are the ink library's ([`inks::Rule`]); `PAGE_RULES`
+//! is a table of conditions on what only the page knows: how small the dots are, how much an ink covers,
+//! what is used. `check` tries each. Nothing here changes the passes. Cost: negligible, except that rules
+//! on cluster size look at the whole page once for each ink concerned.
+//! Source: the vendor's guides, what owners have reported, the open driver's habits, and section 4.2 of the
+//! 2009 paper; each rule's certainty says which.
 
 use std::cmp::Reverse;
 use std::fmt;
@@ -70,8 +70,19 @@ enum When {
     NotLast(Kind),
 }
 
+/// Who can see to it that a rule is not touched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Keeper {
+    /// The program, where it chooses stacks and dots: what it makes of materials on its own touches none of
+    /// these.
+    Program,
+    /// Who prints: by the art, a setting, or by knowing.
+    Owner,
+}
+
 struct PageRule {
     name: &'static str,
+    keeper: Keeper,
     severity: Severity,
     certainty: Certainty,
     when: When,
@@ -80,17 +91,19 @@ struct PageRule {
 
 const fn rule(
     name: &'static str,
+    keeper: Keeper,
     severity: Severity,
     certainty: Certainty,
     when: When,
     text: &'static str,
 ) -> PageRule {
-    PageRule { name, severity, certainty, when, text }
+    PageRule { name, keeper, severity, certainty, when, text }
 }
 
 const PAGE_RULES: [PageRule; 9] = [
     rule(
         "foil-speckle",
+        Keeper::Program,
         Severity::Error,
         Certainty::Published,
         When::Finer(Kind::Foil, 9),
@@ -99,6 +112,7 @@ const PAGE_RULES: [PageRule; 9] = [
     ),
     rule(
         "foil-fine",
+        Keeper::Program,
         Severity::Warning,
         Certainty::Vendor,
         When::Finer(Kind::Foil, 16),
@@ -106,6 +120,7 @@ const PAGE_RULES: [PageRule; 9] = [
     ),
     rule(
         "foil-code",
+        Keeper::Program,
         Severity::Warning,
         Certainty::Inferred,
         When::Uses(Kind::Foil),
@@ -113,6 +128,7 @@ const PAGE_RULES: [PageRule; 9] = [
     ),
     rule(
         "primer-ribbon",
+        Keeper::Program,
         Severity::Note,
         Certainty::Reported,
         When::Uses(Kind::Primer),
@@ -120,6 +136,7 @@ const PAGE_RULES: [PageRule; 9] = [
     ),
     rule(
         "white-thin",
+        Keeper::Owner,
         Severity::Note,
         Certainty::Measured,
         When::Single(Kind::White),
@@ -127,6 +144,7 @@ const PAGE_RULES: [PageRule; 9] = [
     ),
     rule(
         "metallic-fine",
+        Keeper::Program,
         Severity::Warning,
         Certainty::Published,
         When::Finer(Kind::Metallic, 8),
@@ -134,6 +152,7 @@ const PAGE_RULES: [PageRule; 9] = [
     ),
     rule(
         "finish-partial",
+        Keeper::Owner,
         Severity::Note,
         Certainty::Driver,
         When::Partial(Kind::Finish),
@@ -141,6 +160,7 @@ const PAGE_RULES: [PageRule; 9] = [
     ),
     rule(
         "primer-partial",
+        Keeper::Owner,
         Severity::Note,
         Certainty::Driver,
         When::Partial(Kind::Primer),
@@ -148,12 +168,18 @@ const PAGE_RULES: [PageRule; 9] = [
     ),
     rule(
         "finish-pass-last",
+        Keeper::Program,
         Severity::Note,
         Certainty::Driver,
         When::NotLast(Kind::Finish),
         "other inks are printed after finish; this is harmless where they share no dot with it",
     ),
 ];
+
+/// The rules on pages, and who keeps each.
+pub fn keepers() -> impl Iterator<Item = (&'static str, Keeper)> {
+    PAGE_RULES.iter().map(|rule| (rule.name, rule.keeper))
+}
 
 /// What the conditions are tried on.
 struct Page<'a> {
@@ -220,8 +246,8 @@ impl<'a> Page<'a> {
     }
 }
 
-/// The rules a sheet touches, most severe first, those on layers before those on the page. `census` counts the dots
-/// of each stack.
+/// The rules a sheet touches, most severe first, those on layers before those on the page. `census` counts
+/// the dots of each stack.
 pub(super) fn check(sheet: &Sheet, census: &[u64], plan: &Plan, rules: &[Rule]) -> Vec<Check> {
     let page = Page::new(sheet, census, plan);
     let mut checks = Vec::new();

@@ -1,4 +1,5 @@
-//! Two pictures in one print, looked at as a camera would: the dots under one lamp, at the geometries that the views name.
+//! Two pictures in one print, looked at as a camera would: the dots under one lamp, at the geometries that
+//! the views name.
 
 use std::path::Path;
 
@@ -56,6 +57,7 @@ fn printed(document: &Document, inks: &str) -> Halftoned {
         factor: FactorSettings::default(),
         gamut: GamutSettings::default(),
         inks: inks.parse::<InkSet>().unwrap(),
+        held_back: InkSet::EMPTY,
         halftone: halftone::Method::default(),
         size: Some("36x24mm".parse().unwrap()),
     };
@@ -81,7 +83,8 @@ fn each_picture_is_seen_in_its_view_and_the_other_one_is_not() {
         let (dots, space) = (&halftoned.dots, document.materials().space());
         let stacks = reflectances(dots.stacks(), &Library::builtin(), space);
         let print = Source::Print { dots, space, stacks: &stacks, area: Area::whole(dots) };
-        // A camera above, the lamp at 45 degrees and then beside the camera: half angles of 22.5 and 0 degrees.
+        // A camera above, the lamp at 45 degrees and then beside the camera: half angles of 22.5 and 0
+        // degrees.
         let lamps = [Light::Far([1.0, 0.0, 1.0]), Light::Far([0.0, 0.0, 1.0])];
         let photographs = flat(&print, &lamps, SIDES.0, SIDES.1, &Silent).unwrap();
         let seen: Vec<Vec<f64>> = photographs
@@ -98,7 +101,8 @@ fn each_picture_is_seen_in_its_view_and_the_other_one_is_not() {
             let [own, other] = [view, 1 - view].map(|k| correlation(seen, &drawn[k]));
             assert!(own > 0.9 && other.abs() < between + 0.1, "{inks}, view {view}: {own}, {other}");
         }
-        // The stated contrasts, by hand: white and black bars beside the disc, and the disc on a bar of one grey.
+        // The stated contrasts, by hand: white and black bars beside the disc, and the disc on a bar of one
+        // grey.
         let (views, target) = (document.views.as_ref().unwrap(), document.as_factored().unwrap());
         let found = contrasts(target, views, &print, EYE).unwrap().unwrap();
         assert!(found.straight[0] > least && found.reflection[1] > least, "{inks}: {found}");

@@ -16,6 +16,8 @@ use inks::{InkSet, InkSetError, Library, Trust};
 use make::choice::{Metric, name};
 use make::options::HALFTONE;
 use make::print::SEED;
+use protocol::ink::{Ink, Kind};
+use protocol::rgl::Media;
 
 use appearance::document::{self, ColourSpace, Document};
 use appearance::factor::{self, Method};
@@ -29,8 +31,8 @@ use observe::Observer;
 /// What to read.
 #[derive(Args, Debug)]
 pub struct DocumentArgs {
-    /// Document: a folder of texture maps or its .zip, a .gltf, .glb, .mtlx, .usda, .usdz or .mtl file, a measured BRDF (.binary,
-    /// .bsdf, .brdf, .csv), a .foil folder, or sample:NAME
+    /// Document: a folder of texture maps or its .zip, a .gltf, .glb, .mtlx, .usda, .usdz or .mtl file, a
+    /// measured BRDF (.binary, .bsdf, .brdf, .csv), a .foil folder, or sample:NAME
     #[arg(
         value_name = "DOC",
         value_parser = utf8(),
@@ -47,7 +49,8 @@ pub struct DocumentArgs {
     /// Encoding of the colour maps [default: the usual one of their file format]
     #[arg(long, value_name = "SPACE", value_parser = choice::<ColourSpace>())]
     pub colour_space: Option<ColourSpace>,
-    /// Number of angles at which each reflectance curve is sampled, 32 to 512; 32 is enough for anything printable
+    /// Number of angles at which each reflectance curve is sampled, 32 to 512; 32 is enough for anything
+    /// printable
     #[arg(long, default_value_t = document::SAMPLES, value_parser = whole(32..=512usize))]
     pub samples: usize,
 }
@@ -55,14 +58,16 @@ pub struct DocumentArgs {
 /// Pictures to make a document of.
 #[derive(Args, Debug, Default)]
 pub struct PicturesArgs {
-    /// Picture seen straight on, where --highlight names another one that is seen in the reflection of the light
+    /// Picture seen straight on, where --highlight names another one that is seen in the reflection of the
+    /// light
     #[arg(long, value_name = "PICTURE", requires = "highlight", conflicts_with_all = ["document", "material", "hdr"])]
     pub straight: Option<PathBuf>,
-    /// Picture of the same proportions seen in the reflection of the light. What is black in it cannot be seen: a white
-    /// mark on black is hidden until the light falls on it
+    /// Picture of the same proportions seen in the reflection of the light. What is black in it cannot be
+    /// seen: a white mark on black is hidden until the light falls on it
     #[arg(long, value_name = "PICTURE", requires = "straight", conflicts_with_all = ["document", "material", "hdr"])]
     pub highlight: Option<PathBuf>,
-    /// Picture with more light than white (.hdr, .exr, float .tif), whose exposure changes as the print is tilted
+    /// Picture with more light than white (.hdr, .exr, float .tif), whose exposure changes as the print is
+    /// tilted
     #[arg(long, value_name = "PICTURE", conflicts_with_all = ["document", "material"])]
     pub hdr: Option<PathBuf>,
 }
@@ -102,8 +107,8 @@ impl DocumentArgs {
         self.pictures.given().next().map_or_else(|| Path::new(&self.document), |(_, path)| path)
     }
 
-    /// Opens the document. The reader notes to the observer what it had to assume. `at_hand` gives the inks, by which two
-    /// pictures are kept apart, and their library.
+    /// Opens the document. The reader notes to the observer what it had to assume. `at_hand` gives the
+    /// inks, by which two pictures are kept apart, and their library.
     pub fn open(
         &self,
         at_hand: impl FnOnce() -> Result<(InkSet, Library)>,
@@ -187,10 +192,11 @@ impl FactorArgs {
 /// What to print with.
 #[derive(Args, Clone, Debug)]
 pub struct InkArgs {
-    /// Inks to print with, such as process,MS or -finish [default: all but the foils]
+    /// Inks to print with, such as process,MS or -finish [default: all but the foils, and
+    /// but primer on plain paper]
     ///
-    /// Names and the groups process, metallic, clear, foil, default, all, separated by commas; a leading - removes one from the
-    /// default.
+    /// Names and the groups process, metallic, clear, foil, default, all, separated by commas; a leading -
+    /// removes one from the default.
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     pub inks: Option<String>,
     /// Your own ink library: its folder, or the name it was added under [default: the built-in library]
@@ -227,6 +233,31 @@ impl InkArgs {
         Ok((set, library))
     }
 
+    /// The same for a document on a sheet of this kind: without primer where its ribbon can tear, and
+    /// without what nobody has named.
+    pub fn on(&self, media: Media) -> Result<AtHand> {
+        let (inks, library) = self.at_hand()?;
+        let is_plain = matches!(media, Media::Plain | Media::PlainTwice);
+        let torn = |ink: &Ink| is_plain && ink.kind() == Kind::Primer && !self.names(*ink);
+        let kept = InkSet::of(inks.iter().filter(|ink| !torn(ink)));
+        if kept.is_empty() {
+            return Ok(AtHand { inks, held_back: InkSet::EMPTY, library });
+        }
+        let foils = Ink::ALL.into_iter().filter(|ink| ink.kind() == Kind::Foil && self.inks.is_none());
+        let held_back = InkSet::of(inks.iter().filter(torn).chain(foils));
+        Ok(AtHand { inks: kept, held_back, library })
+    }
+
+    /// Whether the owner has asked for an ink, by its name or that of a group other than the default.
+    fn names(&self, ink: Ink) -> bool {
+        let words = self.inks.iter().flat_map(|text| text.split(',')).map(str::trim);
+        let asked = words.filter(|word| !word.starts_with('-')).map(|word| word.trim_start_matches('+'));
+        asked.filter(|word| !word.eq_ignore_ascii_case("default")).any(|word| {
+            let set: Result<InkSet, InkSetError> = word.parse();
+            set.is_ok_and(|set| set.contains(ink))
+        })
+    }
+
     fn set(&self) -> Result<InkSet> {
         let set: InkSet = match &self.inks {
             Some(text) => text.parse().map_err(|error: InkSetError| usage(format!("--inks: {error}")))?,
@@ -244,6 +275,17 @@ impl InkArgs {
     }
 }
 
+/// The inks to print a document with.
+#[derive(Clone)]
+pub struct AtHand {
+    /// Those to mix.
+    pub inks: InkSet,
+    /// Those that are there, or might be, and wait until the owner names them.
+    pub held_back: InkSet,
+    /// Their library.
+    pub library: Library,
+}
+
 /// How mixtures become dots.
 #[derive(Args, Debug)]
 pub struct HalftoneArg {
@@ -256,15 +298,15 @@ pub struct HalftoneArg {
 pub struct GamutArgs {
     /// How to treat materials that no ink can make
     ///
-    /// basis keeps their differences (the paper's way), clamp keeps each one as close as possible, blend lies between, contrast
-    /// keeps differences between neighbours, auto clamps unless that would make different materials look alike that blend keeps
-    /// apart.
+    /// basis keeps their differences (the paper's way), clamp keeps each one as close as possible, blend
+    /// lies between, contrast keeps differences between neighbours, auto clamps unless that would make
+    /// different materials look alike that blend keeps apart.
     #[arg(long, value_name = "INTENT", default_value = "auto", value_parser = choice::<Intent>())]
     pub intent: Intent,
     /// What "close" means
     ///
-    /// light counts how much light a material returns beside the shape of its highlight, so that metals shine; paper is the
-    /// distance of the 2009 paper, which counts the shape alone.
+    /// light counts how much light a material returns beside the shape of its highlight, so that metals
+    /// shine; paper is the distance of the 2009 paper, which counts the shape alone.
     #[arg(long, value_name = "METRIC", default_value = "light", value_parser = choice::<Metric>())]
     pub metric: Metric,
 }

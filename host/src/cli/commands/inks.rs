@@ -1,5 +1,5 @@
-//! `foilpress inks`: list, show and check the inks and stacks of a library; what else is done with libraries is in the
-//! modules below.
+//! `foilpress inks`: list, show and check the inks and stacks of a library; what else is done with
+//! libraries is in the modules below.
 
 mod choose;
 mod diff;
@@ -43,17 +43,18 @@ pub struct Args {
 
 #[derive(clap::Subcommand, Debug)]
 enum What {
-    /// List the stacks with their layers, their peak reflectance and the origin of their curves; or what was added
+    /// List the stacks with their layers, their peak reflectance and the origin of their curves; or what
+    /// was added
     List {
         /// List the libraries and inks that were added with `inks add` instead
         #[arg(long, conflicts_with_all = ["library", "inks"])]
         added: bool,
-        /// Ink library: its folder, or the name it was added under [default: the built-in library, which is modelled, not
-        /// measured]
+        /// Ink library: its folder, or the name it was added under [default: the built-in library, which is
+        /// modelled, not measured]
         #[arg(long, value_name = "LIBRARY")]
         library: Option<PathBuf>,
-        /// List only stacks made of these inks, such as `process,metallic-silver,finish`, `all` or `-metallic`; foils are
-        /// left out unless they or `all` are named [default: list every stack]
+        /// List only stacks made of these inks, such as `process,metallic-silver,finish`, `all` or
+        /// `-metallic`; foils are left out unless they or `all` are named [default: list every stack]
         #[arg(long, value_name = "INKS", allow_hyphen_values = true)]
         inks: Option<InkSet>,
         /// Print JSON
@@ -78,14 +79,16 @@ enum What {
     From(from::Args),
     /// Predict the stacks that were not measured from those that were
     ///
-    /// The figures of the layer model are fitted to all measured curves. A stack is predicted if each of its inks is in a measured
-    /// stack. Each measured stack is also predicted from the others alone, which shows how far predictions are off.
+    /// The figures of the layer model are fitted to all measured curves. A stack is predicted if each of
+    /// its inks is in a measured stack. Each measured stack is also predicted from the others alone, which
+    /// shows how far predictions are off.
     Predict(predict::Args),
     /// Check a library and list every problem with its file, line and field
     ///
-    /// Errors make a library unusable: files that cannot be read, stacks that reflect more light than arrives. Warnings doubt a
-    /// curve: it rises where prints only fall, its samples scatter, its highlight is clipped, a process ink adds light. Notes
-    /// say what was not measured, and how uncertain the rest is.
+    /// Errors make a library unusable: files that cannot be read, stacks that reflect more light than
+    /// arrives. Warnings doubt a curve: it rises where prints only fall, its samples scatter, its highlight
+    /// is clipped, a process ink adds light. Notes say what was not measured, and how uncertain the rest
+    /// is.
     #[command(after_help = "Examples:\n  \
         foilpress inks check my-library/\n  \
         foilpress inks check my-library/ --json")]
@@ -101,7 +104,8 @@ enum What {
     Diff(diff::Args),
     /// Choose the best cartridges for a document, and show what each is worth
     ///
-    /// The choice is exact for a sample of the document's pixels: no other set of cartridges comes nearer to them.
+    /// The choice is exact for a sample of the document's pixels: no other set of cartridges comes nearer
+    /// to them.
     Choose(choose::Args),
     /// Show how near a library comes to the bases of a document
     Gamut(gamut::Args),
@@ -109,9 +113,9 @@ enum What {
     Redundant(gamut::Redundant),
     /// Add a library to your own, so that --library finds it by its name; or an ink of another maker
     ///
-    /// A ribbon of another maker is in a cartridge that the printer takes for one it knows. With --as and --colour the ink gets a
-    /// name of its own: art, options and queues may use it, and plans and the check of the cartridges show it beside the
-    /// ink it poses as.
+    /// A ribbon of another maker is in a cartridge that the printer takes for one it knows. With --as and
+    /// --colour the ink gets a name of its own: art, options and queues may use it, and plans and the check
+    /// of the cartridges show it beside the ink it poses as.
     #[command(after_help = "Examples:\n  \
         foilpress inks add my-library/\n  \
         foilpress inks add my-library/ --name matt-paper\n  \
@@ -211,7 +215,8 @@ pub fn run(args: Args, observer: &dyn Observer) -> anyhow::Result<()> {
     }
 }
 
-/// The entry of a stack given as text, on the list or beyond it, as prints use both. Suggests another when there is none.
+/// The entry of a stack given as text, on the list or beyond it, as prints use both. Suggests another when
+/// there is none.
 fn find<'a>(library: &'a Library, text: &str) -> anyhow::Result<Cow<'a, Entry>> {
     let stack: Stack = text.parse()?;
     if let Some(entry) = library.entry(&stack) {
@@ -284,7 +289,7 @@ fn list(library: &Library, inks: Option<InkSet>, json: bool) -> anyhow::Result<S
         "no.", "stack", "f(0)", "f(30)", "curve"
     )?;
     for entry in &entries {
-        let at = |degrees: f64| appearance::views::luminance(entry.curve.at(degrees.to_radians()));
+        let at = |degrees: f64| appearance::srgb::luminance(entry.curve.at(degrees.to_radians()));
         writeln!(
             text,
             "{:>3}  {:<10} {:>9.4} {:>9.4}  {:<10} {}",

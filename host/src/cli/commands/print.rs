@@ -32,9 +32,9 @@ pub struct Work {
 impl Work {
     /// The plan of the document. Nothing is written.
     pub fn draft(&self, observer: &dyn Observer) -> Result<Draft> {
-        let inks = self.dots.inks.at_hand()?;
-        let document = self.dots.document.open(|| Ok(inks.clone()), observer)?;
         let handling = self.media.handling();
+        let inks = self.dots.inks.on(handling.media)?;
+        let document = self.dots.document.open(|| Ok((inks.inks, inks.library.clone())), observer)?;
         let page = |layout| PageSettings { layout, handling, ..PageSettings::default() };
         Ok(self.dots.halftone(document, inks, page, observer)?.draft(observer)?)
     }
@@ -68,9 +68,9 @@ pub struct Args {
 /// Runs `print`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let dots = &args.work.dots;
-    let inks = dots.inks.at_hand()?;
+    let inks = dots.inks.on(args.work.media.handling().media)?;
     let probe = args.probe.as_deref().map(Probe::read).transpose()?;
-    let document = dots.document.open(|| Ok(inks.clone()), observer)?;
+    let document = dots.document.open(|| Ok((inks.inks, inks.library.clone())), observer)?;
     let places = Places::new(&document.name, &args.result, &args.deliver)?;
     let page = |layout| printing::page(layout, &args.work.media, &args.result);
     let mut print = dots.halftone(document, inks, page, observer)?;

@@ -1,5 +1,5 @@
-//! Every step of the chain by itself: each command reads what the one before it wrote. Together they give the job of
-//! `print`, since the steps are the ones that `pipeline` is made of.
+//! Every step of the chain by itself: each command reads what the one before it wrote. Together they give
+//! the job of `print`, since the steps are the ones that `pipeline` is made of.
 
 use std::borrow::Cow;
 use std::fs;
@@ -10,7 +10,7 @@ use clap::Args as ClapArgs;
 
 use crate::cli::arguments::choice::{choice, utf8};
 use crate::cli::arguments::layout::{LayoutArgs, MediaArgs};
-use crate::cli::arguments::{DocumentArgs, FactorArgs, GamutArgs, HalftoneArg, InkArgs};
+use crate::cli::arguments::{AtHand, DocumentArgs, FactorArgs, GamutArgs, HalftoneArg, InkArgs};
 use crate::cli::console::print_job;
 use crate::cli::output::{self, Kind, Staged};
 use appearance::document::foil::{self, Origin};
@@ -26,7 +26,7 @@ use press::layout;
 use press::pipeline::{self, document as stages};
 use press::separate;
 use protocol::paper::Paper;
-use protocol::rgl::Resolution;
+use protocol::rgl::{Media, Resolution};
 use sheet::DotMap;
 use sheet::Size;
 
@@ -45,7 +45,8 @@ pub struct Factor {
     document: DocumentArgs,
     #[command(flatten)]
     factor: FactorArgs,
-    /// Folder to write: bases.csv, weight maps as pictures, document.toml [default: DOC.foil in the current folder]
+    /// Folder to write: bases.csv, weight maps as pictures, document.toml [default: DOC.foil in the current
+    /// folder]
     #[arg(short, long, value_name = "DOC.foil")]
     output: Option<PathBuf>,
 }
@@ -76,7 +77,8 @@ pub struct Map {
     /// Folder written by `factor`
     #[arg(value_name = "DOC.foil")]
     factored: PathBuf,
-    /// Document that was factored, so that clamp and blend use its own pixels instead of mixtures of the bases
+    /// Document that was factored, so that clamp and blend use its own pixels instead of mixtures of the
+    /// bases
     #[arg(long, value_name = "DOC", value_parser = utf8())]
     document: Option<String>,
     /// Material of that document, as given to `factor`
@@ -92,7 +94,8 @@ pub struct Map {
     /// Seed of the random sample of pixels by which cartridges are chosen
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Folder to write: weight maps over stacks as pictures, mix.toml [default: DOC.mix in the current folder]
+    /// Folder to write: weight maps over stacks as pictures, mix.toml [default: DOC.mix in the current
+    /// folder]
     #[arg(short, long, value_name = "DOC.mix")]
     output: Option<PathBuf>,
 }
@@ -100,7 +103,7 @@ pub struct Map {
 impl Map {
     /// Bases → mixtures of stacks.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
-        let (set, library) = self.inks.at_hand()?;
+        let AtHand { inks, library, .. } = self.inks.on(Media::default())?;
         let read = foil::read(&Disk, &self.factored, observer)?;
         let (factored, _) = stages::factored(&read, &Default::default(), observer)?;
         let document = self
@@ -121,7 +124,7 @@ impl Map {
             self.check_origin(document, &factored, observer)?;
         }
         let staged = Staged::folder(&named(&self.output, &self.factored, "mix"), Kind::Mix)?;
-        let printable = Printable::combined(&library, &set, &factored.space);
+        let printable = Printable::combined(&library, &inks, &factored.space);
         let materials = document.as_ref().map(|document| document.materials());
         let pixels = materials.unwrap_or(&*factored);
         let bases = || Ok::<_, GamutError>(Cow::Borrowed(&*factored));
@@ -136,8 +139,8 @@ impl Map {
         staged.commit()
     }
 
-    /// With a document its pixels are mapped, and only their bases come from what was factored: so it must be the one that was factored,
-    /// and nothing may have been changed since.
+    /// With a document its pixels are mapped, and only their bases come from what was factored: so it must
+    /// be the one that was factored, and nothing may have been changed since.
     fn check_origin(&self, document: &Document, factored: &Factored, observer: &dyn Observer) -> Result<()> {
         let problem = match foil::origin(&Disk, &self.factored, observer)? {
             None => "it was edited, or made by hand",
@@ -168,11 +171,12 @@ pub struct Halftone {
     size: Option<Size>,
     #[command(flatten)]
     halftone: HalftoneArg,
-    /// Your own ink library: its folder, or the name it was added under; its minimum clusters apply [default: the built-in
-    /// library]
+    /// Your own ink library: its folder, or the name it was added under; its minimum clusters apply
+    /// [default: the built-in library]
     #[arg(long, value_name = "LIBRARY")]
     library: Option<PathBuf>,
-    /// Folder to write: a picture with one stack for every dot, dots.toml [default: DOC.dots in the current folder]
+    /// Folder to write: a picture with one stack for every dot, dots.toml [default: DOC.dots in the current
+    /// folder]
     #[arg(short, long, value_name = "DOC.dots")]
     output: Option<PathBuf>,
 }
@@ -235,11 +239,12 @@ pub struct Separate {
     /// Folder written by `layout` or `simulate`
     #[arg(value_name = "DOC.sheet")]
     sheet: PathBuf,
-    /// Your own ink library: its folder, or the name it was added under; its order rules apply [default: the built-in
-    /// library]
+    /// Your own ink library: its folder, or the name it was added under; its order rules apply [default:
+    /// the built-in library]
     #[arg(long, value_name = "LIBRARY")]
     library: Option<PathBuf>,
-    /// Folder to write: a one-bit picture for each pass, passes.toml [default: DOC.passes in the current folder]
+    /// Folder to write: a one-bit picture for each pass, passes.toml [default: DOC.passes in the current
+    /// folder]
     #[arg(short, long, value_name = "DOC.passes")]
     output: Option<PathBuf>,
 }

@@ -26,6 +26,7 @@ fn a_document_becomes_the_very_sheet_whatever_happens_on_the_way() {
         factor: factor::FactorSettings::default(),
         gamut: gamut::GamutSettings::default(),
         inks: inks::InkSet::default(),
+        held_back: inks::InkSet::EMPTY,
         halftone: Default::default(),
         size: Some("12x9mm".parse().unwrap()),
     };

@@ -1,4 +1,5 @@
-//! Mapping single materials by eq. 1, with pruning and a certificate: the bases, or those shown of a clamped document.
+//! Mapping single materials by eq. 1, without what is rare and with a certificate: the bases, or those
+//! shown of a clamped document.
 
 use rayon::prelude::*;
 
@@ -6,7 +7,6 @@ use super::gloss;
 use crate::brdf::{Space, Table};
 use crate::gamut::candidates::Candidates;
 use crate::gamut::error::GamutError;
-use crate::gamut::prune::prune;
 use crate::gamut::result::report::MaterialReport;
 use crate::gamut::settings::Gloss;
 use crate::solve::{Best, Mixer, MixtureError};
@@ -97,13 +97,10 @@ fn map_row(row: &[f64], candidates: &Candidates, mixer: &mut Mixer) -> Result<Ma
     let best = mixer.best(&candidates.priced, &target)?;
     let mut weights = best.weights.clone();
     // The price has selected the stacks; the final weights minimise the distance alone.
-    let unpruned = mixer.polish(&candidates.free, &target, &mut weights, 0.0)?.distance;
-    let mut distance = unpruned;
-    while prune(&mut weights) {
-        distance = mixer.polish(&candidates.free, &target, &mut weights, 0.0)?.distance;
-    }
+    let all = mixer.polish(&candidates.free, &target, &mut weights, 0.0)?;
+    let settled = candidates.brightness.settle(mixer, &candidates.free, &target, &mut weights, all, 0.0)?;
     let mut shares = vec![0; weights.len()];
     quantise(&weights, &mut shares);
     let printed = candidates.reflectance(shares.iter().map(|&s| f64::from(s) / f64::from(ONE)));
-    Ok(Mapping { best, weights, shares, printed, pruning_cost: distance - unpruned })
+    Ok(Mapping { best, weights, shares, printed, pruning_cost: settled.distance - all.distance })
 }

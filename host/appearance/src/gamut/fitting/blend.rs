@@ -1,10 +1,12 @@
 //! The weight of the clamped mixture at each pixel, smooth over the document.
 //!
-//! Problem: clamping is best inside the gamut and loses differences outside; the mapped bases keep differences everywhere
-//! and are never exact. Any average of the two is printable.
-//! Method: the weight s falls from 1 at an invisible distance to 0 at an obvious one (smoothstep). A guided filter then
-//! smooths it within a material and lets it change where the material does, so that no new edges appear.
-//! Cost: 20 passes over the pixels, independent of the radius, and a comparison of each pixel with its average.
+//! Problem: clamping is best inside the gamut and loses differences outside; the mapped bases keep
+//! differences everywhere and are never exact. Any average of the two is printable.
+//! Method: the weight s falls from 1 at an invisible distance to 0 at an obvious one (smoothstep). A guided
+//! filter then smooths it within a material and lets it change where the material does, so that no new
+//! edges appear.
+//! Cost: 20 passes over the pixels, independent of the radius, and a comparison of each pixel with its
+//! average.
 //! Source: He, Sun & Tang 2010 for the filter; the guide is the mean cube root of the reflected radiance.
 
 use rayon::prelude::*;
@@ -13,11 +15,11 @@ use super::clamp::Clamped;
 use super::refit::{Solver, in_pixel};
 use crate::gamut::candidates::Candidates;
 use crate::gamut::error::GamutError;
-use crate::gamut::prune::prune;
 use crate::materials::Materials;
 use crate::weights::{ONE, WeightMaps, quantise};
 
-/// The distance up to which a clamped pixel counts as in the gamut, and the one from which it counts as far outside.
+/// The distance up to which a clamped pixel counts as in the gamut, and the one from which it counts as far
+/// outside.
 const INVISIBLE: f32 = 0.01;
 const OBVIOUS: f32 = 0.05;
 /// Pixels per parallel task: enough work for a thread, and many tasks so that no thread waits for another.
@@ -38,8 +40,8 @@ pub(crate) fn shares(distance: &[f32], brightness: &[f32], width: usize) -> Vec<
     guided(&near, brightness, width, RADIUS, EDGE * EDGE)
 }
 
-/// Averages the clamped mixture of each pixel with its mixture of the mapped bases; `s` is the weight of the former. The
-/// distances become those of the averages.
+/// Averages the clamped mixture of each pixel with its mixture of the mapped bases; `s` is the weight of
+/// the former. The distances become those of the averages.
 pub(crate) fn mix(
     candidates: &Candidates,
     pixels: &dyn Materials,
@@ -67,8 +69,8 @@ pub(crate) fn mix(
     .collect()
 }
 
-/// The average of a pixel's clamped mixture, with weight `s`, and its mixture of the mapped bases. Weights below 0.5 % are
-/// left out. `row` has room for one number a candidate.
+/// The average of a pixel's clamped mixture, with weight `s`, and its mixture of the mapped bases. `row`
+/// has room for one number a candidate.
 pub(crate) fn average(shares: &mut [u16], s: f32, weights: &[u16], bases: &[Vec<u16>], row: &mut [f64]) {
     let s = f64::from(s);
     row.fill(0.0);
@@ -81,7 +83,6 @@ pub(crate) fn average(shares: &mut [u16], s: f32, weights: &[u16], bases: &[Vec<
     for (row, &share) in row.iter_mut().zip(shares.iter()) {
         *row = (*row + s * f64::from(share)) / f64::from(ONE);
     }
-    prune(row);
     quantise(row, shares);
 }
 
@@ -172,8 +173,8 @@ mod tests {
         assert!(shares.iter().all(|s| (s - 0.5).abs() < 1e-6), "{:?}", &shares[..4]);
     }
 
-    /// Two flat materials side by side, one printable and one far outside: the weight changes with the material and is
-    /// constant on either side.
+    /// Two flat materials side by side, one printable and one far outside: the weight changes with the
+    /// material and is constant on either side.
     #[test]
     fn shares_change_where_the_material_does() {
         let width = 64;

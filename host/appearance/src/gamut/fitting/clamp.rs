@@ -1,12 +1,15 @@
 //! Mapping every pixel by eq. 1.
 //!
-//! Problem: a million constrained fits in the perceptual metric, which takes hours or days according to the 2009 paper.
-//! Method: each distinct material, in reading order, starts from the mixture of the most similar one of the last few hundred
-//! ([`WarmStarts`]). Two or three steps, with half a dozen stacks in the quadratic and the gradient of all stacks, reach a gap below
-//! 1e-7 in squared distance. Weights below 0.5 % are pruned and the others solved again. Each thread takes whole runs of fixed
-//! length, so the result does not depend on the number of threads.
-//! Cost: about 7 microseconds per distinct material and core. Limits: the start matters where E is not convex; there the
-//! certificate holds only for the local minimum that was found.
+//! Problem: a million constrained fits in the perceptual metric, which takes hours or days according to the
+//! 2009 paper.
+//! Method: each distinct material, in reading order, starts from the mixture of the most similar one of the
+//! last few hundred ([`WarmStarts`]). Two or three steps, with half a dozen stacks in the quadratic and the
+//! gradient of all stacks, reach a gap below 1e-7 in squared distance. Stacks that are rare and seen are
+//! left out and the others solved again. Each thread takes whole runs of fixed length, so the result does
+//! not depend on the number of threads.
+//! Cost: about 7 microseconds per distinct material and core. Limits: the start matters where F is not
+//! convex; there the certificate holds only for the local minimum that was found, which is the better of
+//! two where hue has a price.
 
 use rayon::prelude::*;
 
@@ -14,7 +17,6 @@ use super::warm_start::WarmStarts;
 use crate::brdf::{Space, Table};
 use crate::gamut::candidates::Candidates;
 use crate::gamut::error::GamutError;
-use crate::gamut::prune::prune;
 use crate::materials::{Distinct, Materials};
 use crate::solve::{Mixer, MixtureError, Target};
 use crate::weights::quantise;
@@ -22,12 +24,14 @@ use observe::Observer;
 
 /// Materials per run: a run starts with nothing to start from, and thousands of cores are not expected.
 const RUN: usize = 8192;
-/// An invisible gap in squared distance: at d = 0.01 it is 5e-6 in d. A tenth of the price of a layer, which decides ties.
+/// An invisible gap in squared distance: at d = 0.01 it is 5e-6 in d. A tenth of the price of a layer,
+/// which decides ties.
 pub(crate) const ENOUGH: f64 = 1e-7;
 
 /// The mixture of every pixel over the candidates.
 pub(crate) struct Clamped {
-    /// Interleaved fixed-point weights, one per candidate; those of each pixel sum to [`ONE`](crate::weights::ONE).
+    /// Interleaved fixed-point weights, one per candidate; those of each pixel sum to
+    /// [`ONE`](crate::weights::ONE).
     pub shares: Vec<u16>,
     /// Distance d between each pixel and its mixture.
     pub distance: Vec<f32>,
@@ -128,7 +132,7 @@ struct Walker {
     mixer: Mixer,
     target: Target,
     row: Vec<f32>,
-    /// The mixture, before and after pruning.
+    /// The mixture, with what is rare and without.
     start: Vec<f64>,
     weights: Vec<f64>,
     recent: WarmStarts,
@@ -160,18 +164,20 @@ impl Walker {
         pixels.reflectance(pixel, &mut self.row);
         let hull = &candidates.priced;
         hull.aim(self.row.iter().map(|&f| f64::from(f)), &mut self.target)?;
-        if !self.recent.start(hull, &self.target, &mut self.start) {
+        let found = self.recent.start(hull, &self.target, &mut self.start);
+        if found.is_none() {
             self.mixer.tangent(hull, &self.target, &mut self.start)?;
         }
-        let mut fit = self.mixer.refine(hull, &self.target, &mut self.start, ENOUGH)?;
+        let mut fit = if found == Some(true) {
+            self.mixer.refine(hull, &self.target, &mut self.start, ENOUGH)?
+        } else {
+            self.mixer.refine_beyond(hull, &self.target, &mut self.start, ENOUGH)?
+        };
+        self.recent.keep(&self.start);
         let gap = fit.gap;
-        self.recent.keep(hull, &self.target, &self.start);
         self.weights.copy_from_slice(&self.start);
-        if prune(&mut self.weights) {
-            fit = self.mixer.polish(hull, &self.target, &mut self.weights, ENOUGH)?;
-            // Weights that have become small now are not worth another round.
-            prune(&mut self.weights);
-        }
+        let brightness = &candidates.brightness;
+        fit = brightness.settle(&mut self.mixer, hull, &self.target, &mut self.weights, fit, ENOUGH)?;
         quantise(&self.weights, out);
         let light = candidates.light_distance(&self.weights, pixels.space(), &self.row);
         let brightness = self.target.brightness(hull) / self.measure;

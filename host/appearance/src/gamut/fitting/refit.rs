@@ -1,14 +1,14 @@
 //! Pixels fitted by eq. 1 with their targets moved.
 //!
-//! Problem: what keeps contrast between neighbours and what an eye averages over both ask of a pixel something else than its own
-//! nearest mixture.
-//! Method: a moved target is a target ([`Target::shift`]), so the solver of clamping fits it, from the pixel's last mixture.
+//! Problem: what keeps contrast between neighbours and what an eye averages over both ask of a pixel
+//! something else than its own nearest mixture.
+//! Method: a moved target is a target ([`Target::shift`]), so the solver of clamping fits it, from the
+//! pixel's last mixture.
 //! Cost: two or three steps of the solver. Limits: those of [`Mixer::refine`].
 
 use super::clamp::ENOUGH;
 use crate::gamut::candidates::Candidates;
 use crate::gamut::error::GamutError;
-use crate::gamut::prune::prune;
 use crate::materials::Materials;
 use crate::solve::{Mixer, MixtureError, Target};
 use crate::weights::ONE;
@@ -78,11 +78,10 @@ impl<'a> Solver<'a> {
     pub fn solve(&mut self, part: f64, finish: bool) -> Result<(), MixtureError> {
         let hull = &self.candidates.priced;
         self.target.shift(self.shift.iter().map(|c| part * c));
-        self.mixer.refine(hull, &self.target, &mut self.weights, ENOUGH)?;
-        if finish && prune(&mut self.weights) {
-            self.mixer.polish(hull, &self.target, &mut self.weights, ENOUGH)?;
-            // Weights that have become small now are not worth another round.
-            prune(&mut self.weights);
+        let fit = self.mixer.refine(hull, &self.target, &mut self.weights, ENOUGH)?;
+        if finish {
+            let brightness = &self.candidates.brightness;
+            brightness.settle(&mut self.mixer, hull, &self.target, &mut self.weights, fit, ENOUGH)?;
         }
         Ok(())
     }

@@ -1,15 +1,17 @@
 //! Clamped pixels moved so that the print comes nearer where an eye averages, not pixel by pixel.
 //!
-//! Problem: clamping leaves out what no mixture reaches, at each pixel by itself. An eye averages over a spot of many pixels, and
-//! neighbours that could make up for a pixel do not.
-//! Method: reflectance adds, so document and print are averaged over the eye's spot, with the window of the comparison that a
-//! report states: [1 2 1] (x) [1 2 1] over cells of 3/8 of the spot's side. What the average of the print misses, in cube roots,
-//! where the metric is Euclidean, is added to the targets of its pixels, and they are fitted anew from their mixtures. A second
-//! sweep adds what is missed still. A pixel that would hardly move keeps its clamped mixture bit for bit, and a flat material
-//! keeps it anyhow: a target moved away from the gamut has the same nearest mixture.
-//! Cost: two more fits of each pixel that moves; three rows of the space for each cell, of which there are at most 131072, so that the
-//! window of a large document with coarse pixels is wider than the eye's. Limits: two sweeps, so not the optimum; each pixel by
-//! itself comes out farther from the document, by a few percent; documents whose pixels are as large as the spot stay as they are.
+//! Problem: clamping leaves out what no mixture reaches, at each pixel by itself. An eye averages over a
+//! spot of many pixels, and neighbours that could make up for a pixel do not.
+//! Method: reflectance adds, so document and print are averaged over the eye's spot, with the window of the
+//! comparison that a report states: [1 2 1] (x) [1 2 1] over cells of 3/8 of the spot's side. What the
+//! average of the print misses, in cube roots, where the metric is Euclidean, is added to the targets of
+//! its pixels, and they are fitted anew from their mixtures. A second sweep adds what is missed still. A
+//! pixel that would hardly move keeps its clamped mixture bit for bit, and a flat material keeps it anyhow:
+//! a target moved away from the gamut has the same nearest mixture.
+//! Cost: two more fits of each pixel that moves; three rows of the space for each cell, of which there are
+//! at most 131072, so that the window of a large document with coarse pixels is wider than the eye's.
+//! Limits: two sweeps, so not the optimum; each pixel by itself comes out farther from the document, by a
+//! few percent; documents whose pixels are as large as the spot stay as they are.
 
 use maths::Maths;
 use observe::Observer;
@@ -35,8 +37,8 @@ const MOST_CELLS: usize = 1 << 17;
 /// the pixel itself, which clamping fits already.
 const LEAST: f64 = 2.0;
 
-/// Moves clamped pixels of a document, of which `spot` pixels make a side of the square that the eye averages over. Returns the
-/// share of pixels that keep their clamped mixture.
+/// Moves clamped pixels of a document, of which `spot` pixels make a side of the square that the eye
+/// averages over. Returns the share of pixels that keep their clamped mixture.
 pub(crate) fn match_averages(
     candidates: &Candidates,
     pixels: &dyn Materials,
@@ -258,7 +260,8 @@ mod tests {
         let stacks: Vec<Stack> = ["substrate", "K"].map(|stack| stack.parse().unwrap()).to_vec();
         let mut curves = Table::new(space.columns());
         [0.5, 0.1].iter().for_each(|&level| curves.push(&vec![level; space.columns()]));
-        Candidates::new(space, &Printable::new(stacks, curves), 0.28).unwrap()
+        // Without light, so that what is in the gamut is met and no grain is weighed against it.
+        Candidates::new(space, &Printable::new(stacks, curves), 0.0).unwrap()
     }
 
     fn levels(clamped: &Clamped) -> Vec<f64> {

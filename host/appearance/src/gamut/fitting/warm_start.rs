@@ -1,11 +1,16 @@
 //! Where a fit starts: at the solution for the most similar of the materials fitted before.
 //!
-//! Problem: a fit from a good start takes two or three steps instead of five, and the pixel before is not always a good one:
-//! textures are noisy, and materials alternate.
-//! Method: the last [`HELD`] solutions are kept in a ring with a summary of their targets: weighted cube roots of the
-//! radiance at [`NUMBERS`] columns. The nearest summary decides.
-//! Cost: half a microsecond for each target, a tenth of a fit; 8 bytes for each stack and solution. Limits: two targets
-//! that differ only between the columns of the summary look equal, which costs steps and nothing else.
+//! Problem: a fit from a good start takes two or three steps instead of five, and the pixel before is not
+//! always a good one: textures are noisy, and materials alternate. Hue in the dark makes the objective
+//! hollow in places, too, and a walk from one solution to the next would not notice that it has left the
+//! deepest.
+//! Method: the last [`HELD`] solutions are kept in a ring with a summary of their targets: weighted cube
+//! roots of the radiance at [`NUMBERS`] columns. The nearest summary decides. Each also has the summary of
+//! the target from which its hollow comes, for which solutions were sought with care; where that is far,
+//! they are to be sought again.
+//! Cost: half a microsecond for each target, a tenth of a fit; 8 bytes for each stack and solution. Limits:
+//! two targets that differ only between the columns of the summary look equal, which costs steps and
+//! nothing else.
 
 use crate::solve::{Hull, Target};
 use crate::wide::wide;
@@ -13,6 +18,10 @@ use crate::wide::wide;
 /// Solutions that are kept, as measured: on rusty metal with all inks a fit takes 3.9 steps with one, 3.0
 /// with 64, 2.7 with 256, 2.6 with 512.
 const HELD: usize = 256;
+/// Squared distance of targets up to which the solution of one is in the hollow of the other's: barely
+/// visible. Source: hollows change places where both are equally deep, and beside them by less than targets
+/// do.
+const NEAR: f32 = 1e-4;
 /// Numbers in a summary: two of [`LANES`], so that a comparison is a few operations beside a fit's thousands.
 const NUMBERS: usize = 16;
 /// Sums use this many lanes on every processor, so that they are equal on all.
@@ -22,6 +31,10 @@ const LANES: usize = 8;
 #[derive(Default)]
 pub(crate) struct WarmStarts {
     summaries: Vec<[f32; NUMBERS]>,
+    /// The target from which the hollow of each comes.
+    origins: Vec<[f32; NUMBERS]>,
+    /// The last target that was asked for, and the origin of what was found for it or, without, itself.
+    asked: ([f32; NUMBERS], [f32; NUMBERS]),
     /// The weights of each, one after the other.
     weights: Vec<f64>,
     /// The next to be replaced.
@@ -29,26 +42,35 @@ pub(crate) struct WarmStarts {
 }
 
 impl WarmStarts {
-    /// Copies the solution for the most similar target to `start`. False if there is none yet.
-    pub fn start(&self, hull: &Hull, target: &Target, start: &mut [f64]) -> bool {
+    /// Copies the solution for the most similar target to `start`, and says whether it is so similar that
+    /// its hollow is this target's. `None` if there is none yet.
+    pub fn start(&mut self, hull: &Hull, target: &Target, start: &mut [f64]) -> Option<bool> {
         let summary = target.summary(hull);
+        self.asked = (summary, summary);
         let found = wide(
             #[inline(always)]
             || nearest(&summary, &self.summaries),
         );
-        let Some(i) = found else { return false };
+        let i = found?;
         start.copy_from_slice(&self.weights[i * start.len()..][..start.len()]);
-        true
+        let origin = self.origins[i];
+        let near = squared_distance(&origin, &summary) * target.columns() as f32 <= NEAR * NUMBERS as f32;
+        if near {
+            self.asked.1 = origin;
+        }
+        Some(near)
     }
 
-    /// Keeps a solution, in place of the oldest if there is no room.
-    pub fn keep(&mut self, hull: &Hull, target: &Target, solution: &[f64]) {
-        let summary = target.summary(hull);
+    /// Keeps the solution for the last target that was asked for, in place of the oldest if there is no room.
+    pub fn keep(&mut self, solution: &[f64]) {
+        let (summary, origin) = self.asked;
         if self.summaries.len() < HELD {
             self.summaries.push(summary);
+            self.origins.push(origin);
             self.weights.extend_from_slice(solution);
         } else {
             self.summaries[self.oldest] = summary;
+            self.origins[self.oldest] = origin;
             self.weights[self.oldest * solution.len()..][..solution.len()].copy_from_slice(solution);
             self.oldest = (self.oldest + 1) % HELD;
         }
@@ -88,7 +110,8 @@ mod tests {
     use super::*;
     use crate::brdf::{Space, Table};
 
-    /// The weights that come back are those of the target that was kept with the least distance, as all columns have it.
+    /// The weights that come back are those of the target that was kept with the least distance, as all
+    /// columns have it.
     #[test]
     fn the_most_similar_of_the_kept_targets_is_the_start() {
         let space = Space::half_angle(32);
@@ -100,14 +123,15 @@ mod tests {
         let mut recent = WarmStarts::default();
         let mut start = [0.0; 2];
         let target = |level: f64| hull.target(&row(level)).unwrap();
-        assert!(!recent.start(&hull, &target(0.1), &mut start));
+        assert_eq!(recent.start(&hull, &target(0.1), &mut start), None);
         let levels = |i: usize| 0.02 + 0.25 * ((i * 97) % 300) as f64 / 300.0;
         for i in 0..300 {
-            recent.keep(&hull, &target(levels(i)), &[levels(i), 1.0 - levels(i)]);
+            recent.start(&hull, &target(levels(i)), &mut start);
+            recent.keep(&[levels(i), 1.0 - levels(i)]);
         }
         for i in 0..50 {
             let wanted = 0.02 + 0.005 * i as f64;
-            assert!(recent.start(&hull, &target(wanted), &mut start));
+            assert!(recent.start(&hull, &target(wanted), &mut start).is_some());
             let kept = (300 - HELD..300).map(levels);
             let nearest = kept.min_by(|a, b| {
                 let off = |level: f64| (level.cbrt() - wanted.cbrt()).abs();

@@ -4,5 +4,4 @@ pub(super) mod assemble;
 pub mod files;
 pub(super) mod mix;
 pub(super) mod report;
-pub(super) mod typical;
 pub(super) mod uncertainty;

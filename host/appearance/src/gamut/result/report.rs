@@ -25,8 +25,10 @@ pub struct Judged {
     pub rows: Table,
     /// What each counts.
     pub importance: Vec<f64>,
-    /// Their root mean square distance with the cartridges chosen, in the metric of the settings.
-    pub distance: f64,
+    /// Which of them are materials that count, and the share of the document that each covers.
+    pub counted: Vec<(usize, f64)>,
+    /// The root mean square of the objective with the cartridges chosen.
+    pub objective: f64,
 }
 
 /// The report of a mapping.
@@ -37,35 +39,41 @@ pub struct GamutReport {
     /// The inks of the result, in the order of their codes.
     pub cartridges: Vec<Ink>,
     /// Inks left out because of the number of cartridges, those that are missed most first.
-    pub given_up: Vec<GivenUp>,
+    pub given_up: Vec<Worth>,
     /// The factor on the gloss of all bases, if it was scaled.
     pub gloss_scale: Option<f64>,
-    /// Materials before and after mapping: the bases if the intent uses them, otherwise typical materials of the document,
-    /// those that stand for most of it first.
+    /// Materials before and after mapping: the bases if the intent uses them, otherwise typical materials
+    /// of the document, those that stand for most of it first.
     pub materials: Vec<MaterialReport>,
     /// The pixels, for the intents that map them.
     pub pixels: Option<PixelReport>,
-    /// The share of merged pairs ([`PixelReport::merged`]) that [`Intent::Blend`] would leave, if [`Intent::Auto`] tried it
-    /// and clamped all the same.
+    /// The share of merged pairs ([`PixelReport::merged`]) that [`Intent::Blend`] would leave, if
+    /// [`Intent::Auto`] tried it and clamped all the same.
     pub not_blended: Option<f64>,
 }
 
-/// An ink that was left out: root mean square distances of the sample, in the metric of the settings.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GivenUp {
+/// What an ink does, or would do, for the material that it serves most.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Worth {
     /// The ink.
     pub ink: Ink,
-    /// With this ink beside the cartridges chosen.
+    /// What people call the material ([`words`](crate::materials::words)).
+    pub material: String,
+    /// The share of the document that it covers.
+    pub share: f64,
+    /// How far its print is off with the ink, in the unit of the metric.
     pub with: f64,
-    /// With the cartridges chosen.
+    /// The same without it.
     pub without: f64,
+    /// The share of the document whose hue is right with it and not without it.
+    pub hue: f64,
 }
 
 /// One material before and after mapping.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaterialReport {
-    /// The share of the document that it stands for: the mean weight of a basis, or the share of the sampled pixels that are
-    /// nearest to a typical material.
+    /// The share of the document that it stands for: the mean weight of a basis, or the share of the
+    /// sampled pixels that are nearest to a typical material.
     pub share: f64,
     /// The target (1/sr), with scaled gloss if [`GamutReport::gloss_scale`] is set.
     pub target: Vec<f64>,
@@ -87,7 +95,7 @@ pub struct MaterialReport {
     pub starts: usize,
     /// Starts that reached the same distance.
     pub agreeing: usize,
-    /// Increase of the distance by leaving out weights below 0.5 %.
+    /// Increase of the distance by leaving out what is rare.
     pub pruning_cost: f64,
 }
 
@@ -104,7 +112,8 @@ pub struct PixelReport {
     pub max: f64,
     /// The largest gap of any clamped pixel before pruning, in squared distance.
     pub gap: f64,
-    /// Share of sampled pairs of pixels that differ (d > 0.03) but are printed at less than a quarter of that distance.
+    /// Share of sampled pairs of pixels that differ (d > 0.03) but are printed at less than a quarter of
+    /// that distance.
     pub merged: f64,
     /// Mean weight of the clamped mixture in the result: 1 for clamp; for contrast, and with
     /// [`GamutSettings::eye`](crate::gamut::GamutSettings::eye), the share of pixels that keep it.

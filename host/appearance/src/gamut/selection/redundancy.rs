@@ -1,12 +1,14 @@
 //! Stacks that the others can stand for.
 //!
-//! Problem: a stack inside the hull of the others prints nothing that a mixture of them does not, yet it costs cartridges,
-//! passes and time to measure.
-//! Method: each stack is fitted by eq. 1 to mixtures of the others. The one that is missed least is left out, the stacks whose
-//! mixtures used it are fitted again, and so on while the one missed least is missed by less than the limit. At the end all
-//! those left out are fitted to the stacks that stay, which is what leaving them all out costs.
+//! Problem: a stack inside the hull of the others prints nothing that a mixture of them does not, yet it
+//! costs cartridges, passes and time to measure.
+//! Method: each stack is fitted by eq. 1 to mixtures of the others. The one that is missed least is left
+//! out, the stacks whose mixtures used it are fitted again, and so on while the one missed least is missed
+//! by less than the limit. At the end all those left out are fitted to the stacks that stay, which is what
+//! leaving them all out costs.
 //! Cost: a millisecond for each fit; a few fits for each stack left out.
-//! Limits: greedy, so another set might be larger. A mixture looks like the stack from afar; near by it shows dots.
+//! Limits: greedy, so another set might be larger. A mixture looks like the stack from afar; near by it
+//! shows dots.
 
 use inks::Stack;
 use rayon::prelude::*;
@@ -14,7 +16,7 @@ use rayon::prelude::*;
 use crate::brdf::Space;
 use crate::gamut::candidates::{Candidates, Printable};
 use crate::gamut::error::GamutError;
-use crate::gamut::prune::PRUNED;
+use crate::gamut::rare::LEAST;
 use crate::solve::{Best, Mixer};
 
 /// A stack against the mixtures of others.
@@ -49,18 +51,17 @@ impl Search<'_> {
     }
 
     fn mixture(&self, others: &[usize], best: &Best) -> Vec<(Stack, f64)> {
-        let used = others.iter().zip(&best.weights).filter(|(_, w)| **w >= PRUNED);
+        let used = others.iter().zip(&best.weights).filter(|(_, w)| **w >= LEAST);
         let mut mixture: Vec<_> = used.map(|(&k, &w)| (self.candidates.stacks[k].clone(), w)).collect();
         mixture.sort_by(|a, b| b.1.total_cmp(&a.1));
         mixture
     }
 }
 
-/// All stacks, in their order, with what leaving them out costs in the metric with this weight of light. Stacks are left out
-/// together while each is missed by at most `limit`. The bare substrate always stays.
+/// All stacks, in their order, with what leaving them out costs in the metric with this weight of light.
+/// Stacks are left out together while each is missed by at most `limit`. The bare substrate always stays.
 ///
-/// # Errors
-/// Fewer than two stacks, or curves that cannot be fitted.
+/// # Errors Fewer than two stacks, or curves that cannot be fitted.
 pub fn redundancy(
     space: &Space,
     printable: &Printable,
@@ -84,7 +85,7 @@ pub fn redundancy(
         .enumerate()
         .map(|(k, (others, best))| LeftOut {
             stack: candidates.stacks[k].clone(),
-            alone: best.fit.distance,
+            alone: best.fit.objective,
             together: None,
             mixture: search.mixture(others, best),
         })
@@ -92,11 +93,12 @@ pub fn redundancy(
     let may_go = |k: usize| !candidates.stacks[k].layers().is_empty();
     loop {
         let staying = (0..count).filter(|&k| search.stays[k] && may_go(k));
-        let distance = |k: usize| fits[k].1.fit.distance;
+        let distance = |k: usize| fits[k].1.fit.objective;
         let next = staying.min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
         let Some(next) = next.filter(|&k| distance(k) <= limit) else { break };
         search.stays[next] = false;
-        // The stacks whose mixture had it, those left out before too: one of them may now be missed by too much.
+        // The stacks whose mixture had it, those left out before too: one of them may now be missed by too
+        // much.
         let concerned: Vec<usize> = (0..count)
             .filter(|&k| {
                 let (others, best) = &fits[k];
@@ -105,17 +107,17 @@ pub fn redundancy(
             .collect();
         let again = fit_all(&search, &concerned)?;
         let missed =
-            concerned.iter().zip(&again).any(|(&k, fit)| !search.stays[k] && fit.1.fit.distance > limit);
+            concerned.iter().zip(&again).any(|(&k, fit)| !search.stays[k] && fit.1.fit.objective > limit);
         if missed {
             search.stays[next] = true;
             // It has to stay; nothing else was decided by it.
-            fits[next].1.fit.distance = f64::INFINITY;
+            fits[next].1.fit.objective = f64::INFINITY;
             continue;
         }
         concerned.into_iter().zip(again).for_each(|(k, fit)| fits[k] = fit);
     }
     for k in (0..count).filter(|&k| !search.stays[k]) {
-        found[k].together = Some(fits[k].1.fit.distance);
+        found[k].together = Some(fits[k].1.fit.objective);
         found[k].mixture = search.mixture(&fits[k].0, &fits[k].1);
     }
     Ok(found)
@@ -187,7 +189,7 @@ mod tests {
             let Some(together) = stack.together else { continue };
             let again = Mixer::new().best(&hull, &hull.target(printable.curves.row(k)).unwrap()).unwrap();
             assert!(
-                together <= limit && (together - again.fit.distance).abs() < 1e-6,
+                together <= limit && (together - again.fit.objective).abs() < 1e-6,
                 "{}: {stack:?}",
                 stack.stack
             );

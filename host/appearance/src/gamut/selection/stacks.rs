@@ -1,12 +1,13 @@
 //! Choosing stacks for a document out of all that the rules allow.
 //!
-//! Problem: the model tells hundreds of stacks apart, of which a document gains by a few, and some of the usual ones print
-//! badly.
-//! Method: a sample is fitted to all stacks of the chosen cartridges. Of those beyond the usual ones, the ones with the largest
-//! shares stay, and so do those with the largest shares where no stack may be used that a rule advises against: what takes
-//! such a stack's place has no share beside it. Then the stacks advised against are left out, all of them or those in least
-//! use first, as long as the sample stays within 1 % of the distance it had. Cost: one fit of the sample, and one of the
-//! targets concerned for each such stack.
+//! Problem: the model tells hundreds of stacks apart, of which a document gains by a few, and some of the
+//! usual ones print badly.
+//! Method: a sample is fitted to all stacks of the chosen cartridges. Of those beyond the usual ones, the
+//! ones with the largest shares stay, and so do those with the largest shares where no stack may be used
+//! that a rule advises against: what takes such a stack's place has no share beside it. Then the stacks
+//! advised against are left out, all of them or those in least use first, as long as the sample stays
+//! within 1 % of the distance it had. Cost: one fit of the sample, and one of the targets concerned for
+//! each such stack.
 
 use super::fitted::{Fitted, Targets};
 use crate::gamut::candidates::Candidates;
@@ -92,7 +93,8 @@ mod tests {
     use crate::gamut::candidates::Printable;
     use inks::Stack;
 
-    /// Substrate, a usual stack that is advised against, its neighbour beyond the list, and one that nobody needs.
+    /// Substrate, a usual stack that is advised against, its neighbour beyond the list, and one that nobody
+    /// needs.
     #[test]
     fn stacks_that_print_badly_go_where_a_neighbour_serves() {
         let space = Space::half_angle(8);
@@ -103,10 +105,10 @@ mod tests {
                 curves.push(&vec![level; space.columns()]);
             }
             let warned = vec![false, true, false, false];
-            let printable = Printable { stacks: stacks.clone(), curves, usual: 2, warned };
+            let printable = Printable { usual: 2, warned, ..Printable::new(stacks.clone(), curves) };
             let candidates = Candidates::new(&space, &printable, 0.0).unwrap();
             let row = candidates.free.target(&vec![target; space.columns()]).unwrap();
-            let targets = Targets { rows: vec![row], importance: vec![1.0] };
+            let targets = Targets { rows: vec![row], importance: vec![1.0], counted: vec![(0, 1.0)] };
             choose(&candidates, &[0, 1, 2, 3], &targets).unwrap()
         };
         // Just as dark: it takes the place of the one that prints badly.

@@ -36,30 +36,31 @@ fn metals() -> Field {
     Field { space: space(), width: SIDE, surfaces: surfaces.collect() }
 }
 
+/// Every cartridge that is printed serves a material: removed by itself, each pixel fitted from nothing and
+/// from several starts, some surface of the document gets worse by what is worth it, or loses its hue.
 #[test]
 fn no_cartridge_is_left_that_brings_nothing() {
     let space = space();
     for (document, metal) in [(wood(), false), (metals(), true)] {
         let printable = Printable::from_library(&Library::builtin(), &InkSet::default(), &space);
         let all = Candidates::new(&space, &printable, LIGHT).unwrap();
-        // As many pixels as the choice is made by, so every one of them is looked at.
         let mapped = clamped(&document, &printable, &GamutSettings::default(), &Silent).unwrap();
         let inks = &mapped.report.cartridges;
-        // Each pixel fitted from nothing, from several starts, to all that these cartridges print.
-        let distance = |left: Option<Ink>| {
+        let fits = |left: Option<Ink>| -> Vec<(f64, bool)> {
             let holds = |k: usize| all.inks[k].iter().all(|i| Some(i) != left && inks.contains(&i));
             let hull = all.free.subset(&(0..all.len()).filter(|&k| holds(k)).collect::<Vec<_>>());
             let rows = document.surfaces.iter().map(|s| {
                 let target = hull.target(&document.space.row(&s.curve(space.angles()))).unwrap();
-                Mixer::new().best(&hull, &target).unwrap().fit.distance.powi(2)
+                let best = Mixer::new().best(&hull, &target).unwrap();
+                (best.fit.objective, hull.keeps_hue(&best.weights, &target))
             });
-            (rows.sum::<f64>() / document.surfaces.len() as f64).sqrt()
+            rows.collect()
         };
-        let with = distance(None);
+        let with = fits(None);
         for &ink in inks {
-            let without = distance(Some(ink));
-            // The choice tells distances apart to a thousandth of these limits.
-            assert!(without > with + (0.0095 * with).max(4.9e-5), "{ink:?} of {inks:?}: {with} {without}");
+            let without = fits(Some(ink));
+            let gains = |(a, b): (&(f64, bool), &(f64, bool))| b.0 - a.0 > 0.0045 || a.1 && !b.1;
+            assert!(with.iter().zip(&without).any(gains), "{ink:?} of {inks:?} serves no surface");
         }
         assert_eq!(inks.iter().any(|ink| ink.kind() == protocol::ink::Kind::Metallic), metal, "{inks:?}");
     }

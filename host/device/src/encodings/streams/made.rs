@@ -135,6 +135,7 @@ fn streams_of_samples_are_those_of_their_bytes_or_no_longer() {
             factor: factor::FactorSettings::default(),
             gamut: gamut::GamutSettings::default(),
             inks: InkSet::default(),
+            held_back: InkSet::EMPTY,
             halftone: method,
             size: Some("40mm".parse().unwrap()),
         };

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use appearance::gamut::{self, Choice, GamutSettings, GivenUp, Printable};
+use appearance::gamut::{self, Choice, GamutSettings, Printable, Worth};
 use observe::Observer;
 use press::separate::MOST_CARTRIDGES;
 use serde_json::{Value, json};
@@ -44,8 +44,12 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<String> {
 }
 
 fn report(choice: &Choice) -> Value {
-    let one =
-        |given: &GivenUp| json!({"ink": given.ink.name(), "with": given.with, "without": given.without});
+    let one = |worth: &Worth| {
+        json!({
+            "ink": worth.ink.name(), "material": worth.material, "share": worth.share,
+            "with": worth.with, "without": worth.without, "hue_share": worth.hue,
+        })
+    };
     json!({
         "cartridges": choice.chosen.iter().map(one).collect::<Vec<_>>(),
         "left_out": choice.given_up.iter().map(one).collect::<Vec<_>>(),
@@ -56,28 +60,25 @@ fn report(choice: &Choice) -> Value {
 }
 
 fn words(choice: &Choice, name: &str, at_hand: usize) -> Result<String, std::fmt::Error> {
-    let mut text = format!(
-        "best cartridges for {name}: {} of {at_hand}\n\n{:<18} {:>14} {:>9}\n",
-        choice.chosen.len(),
-        "cartridge",
-        "without it",
-        "cost"
-    );
-    for given in &choice.chosen {
-        let cost = given.without - given.with;
-        writeln!(text, "{:<18} {:>14.4} {cost:>+9.4}", given.ink.name(), given.without)?;
-    }
-    if !choice.given_up.is_empty() {
-        writeln!(text, "\n{:<18} {:>14} {:>9}", "left out", "with it", "gain")?;
-        for given in &choice.given_up {
-            let gain = given.with - given.without;
-            writeln!(text, "{:<18} {:>14.4} {gain:>+9.4}", given.ink.name(), given.with)?;
+    let mut text = format!("best cartridges for {name}: {} of {at_hand}\n", choice.chosen.len());
+    for (title, inks) in [("cartridge", &choice.chosen), ("left out", &choice.given_up)] {
+        if inks.is_empty() {
+            continue;
+        }
+        writeln!(text, "\n{title:<18} {:>8} {:>11}  serves most", "with it", "without it")?;
+        for Worth { ink, material, share, with, without, hue } in inks {
+            let share = 100.0 * share;
+            write!(text, "{:<18} {with:>8.4} {without:>11.4}  the {material}, {share:.1} %", ink.name())?;
+            if *hue >= 0.005 {
+                write!(text, "; the hue of {:.0} %", 100.0 * hue)?;
+            }
+            writeln!(text)?;
         }
     }
     writeln!(
         text,
         "\n{:.4} with these cartridges, {:.4} with all inks at hand: root mean square differences over {} pixels,\n\
-         light included (0.01: barely visible; 0.05: obvious).",
+         light, hue and grain included (0.01: barely visible; 0.05: obvious).",
         choice.distance, choice.all, choice.pixels
     )?;
     Ok(text)
