@@ -298,18 +298,13 @@ impl Seen {
         let stacks = reflectances(dots.stacks(), &settings.library, space);
         let printed = Source::Print { dots, space, stacks: &stacks, area: Area::whole(dots) };
         let target = self.print.target();
-        let panels = match contrasts {
-            None => Panels::lit(&target, &printed, &STANDARD_LIGHTS, PANEL, observer)?,
-            // Two pictures are looked at one after the other, and the eye adapts to each.
-            Some(_) => Panels::lit(&target, &printed, &TILTS, PANEL, observer)?.each_exposed(),
-        };
+        let lights = if contrasts.is_some() { &TILTS } else { &STANDARD_LIGHTS };
+        let panels = Panels::lit(&target, &printed, lights, PANEL, observer)?;
         let (width, height) = (Mm::of_dots(dots.width() as i64).0, Mm::of_dots(dots.length() as i64).0);
         let notes = [
             format!("{width:.0} x {height:.0} mm, {passes} passes"),
-            format!(
-                "seen from {EYE} m: average d {:.3}, 95 % below {:.3}",
-                self.fidelity.mean, self.fidelity.p95
-            ),
+            format!("seen from {EYE} m: mean d {:.3},", self.fidelity.mean),
+            format!("95 % below {:.3}", self.fidelity.p95),
         ];
         Ok(panels.picture(&document.name, &notes)?)
     }

@@ -21,31 +21,49 @@ pub(super) const INK: [u8; 3] = [232, 232, 232];
 /// Colour of explanatory text.
 pub(super) const FAINT: [u8; 3] = [168, 168, 168];
 
+/// Width of a page on a telephone, in pixels.
+const TELEPHONE: usize = 390;
+
 /// Sizes of letters; all letters of a size have the same width.
 #[derive(Clone, Copy)]
 pub(super) enum Letters {
     Title,
     Plain,
     Small,
+    /// Twice [`Letters::Plain`].
+    Large,
+    /// Twice [`Letters::Title`].
+    Huge,
 }
 
 impl Letters {
     fn font(self) -> &'static MonoFont<'static> {
         match self {
-            Letters::Title => &FONT_10X20,
-            Letters::Plain => &FONT_9X15,
+            Letters::Title | Letters::Huge => &FONT_10X20,
+            Letters::Plain | Letters::Large => &FONT_9X15,
             Letters::Small => &FONT_7X13,
         }
     }
 
+    /// How many times they are enlarged.
+    fn times(self) -> usize {
+        if matches!(self, Letters::Large | Letters::Huge) { 2 } else { 1 }
+    }
+
+    /// The smallest that can be read on a telephone, whose page shows a picture of this width in 390 pixels.
+    pub fn readable(wide: usize) -> Letters {
+        let all = [Letters::Plain, Letters::Title, Letters::Large];
+        all.into_iter().find(|letters| letters.height() * TELEPHONE >= 13 * wide).unwrap_or(Letters::Huge)
+    }
+
     /// Width of a letter in pixels.
     pub fn width(self) -> usize {
-        self.font().character_size.width as usize
+        self.font().character_size.width as usize * self.times()
     }
 
     /// Height of a line in pixels.
     pub fn height(self) -> usize {
-        self.font().character_size.height as usize
+        self.font().character_size.height as usize * self.times()
     }
 }
 
@@ -64,7 +82,8 @@ impl Canvas {
         self.image
     }
 
-    /// Writes a line with its top left corner at (x, y), cut off at the edge. Letters outside Latin-1 become question marks.
+    /// Writes a line with its top left corner at (x, y), cut off at the edge. Letters outside Latin-1
+    /// become question marks.
     pub fn text(&mut self, x: usize, y: usize, letters: Letters, colour: [u8; 3], text: &str) {
         let (width, height) = self.image.size();
         let (width, height) = (width as usize, height as usize);
@@ -74,8 +93,8 @@ impl Canvas {
         let style = MonoTextStyle::new(letters.font(), Rgb888::new(colour[0], colour[1], colour[2]));
         // Cut here, because the drawing library adds up widths without checking for overflow.
         let visible: String = text.chars().take((width - x).div_ceil(letters.width())).collect();
-        let at = Point::new(x as i32, y as i32);
-        let Ok(_) = Text::with_baseline(&visible, at, style, Baseline::Top).draw(self);
+        let text = Text::with_baseline(&visible, Point::zero(), style, Baseline::Top);
+        let Ok(_) = text.draw(&mut Enlarged { canvas: self, at: (x, y), times: letters.times() });
     }
 
     /// Draws radiance over the background with its top left corner at (x, y).
@@ -95,22 +114,32 @@ impl Canvas {
     }
 }
 
-impl OriginDimensions for Canvas {
+/// A canvas on which something is drawn at a place, so many times enlarged.
+struct Enlarged<'a> {
+    canvas: &'a mut Canvas,
+    at: (usize, usize),
+    times: usize,
+}
+
+impl OriginDimensions for Enlarged<'_> {
     fn size(&self) -> Size {
-        Size::from(self.image.size())
+        Size::from(self.canvas.image.size())
     }
 }
 
-impl DrawTarget for Canvas {
+impl DrawTarget for Enlarged<'_> {
     type Color = Rgb888;
     type Error = Infallible;
 
     fn draw_iter<I: IntoIterator<Item = Pixel<Rgb888>>>(&mut self, pixels: I) -> Result<(), Infallible> {
         for Pixel(at, colour) in pixels {
-            if let (Ok(x), Ok(y)) = (u32::try_from(at.x), u32::try_from(at.y))
-                && let Some(pixel) = self.image.at_mut(x, y)
-            {
-                *pixel = [colour.r(), colour.g(), colour.b()];
+            let (Ok(x), Ok(y)) = (usize::try_from(at.x), usize::try_from(at.y)) else { continue };
+            for part in 0..self.times * self.times {
+                let x = self.at.0 + x * self.times + part % self.times;
+                let y = self.at.1 + y * self.times + part / self.times;
+                if let Some(pixel) = self.canvas.image.at_mut(x as u32, y as u32) {
+                    *pixel = [colour.r(), colour.g(), colour.b()];
+                }
             }
         }
         Ok(())

@@ -1,8 +1,9 @@
 //! The target beside the simulated print, under several lights: `sheet.png`.
 //!
-//! The picture has a column for each light and three rows: the target, the print, and a close-up of the print's dots where
-//! they vary most. All panels of a column share one exposure, that of the target, so a difference between rows is a difference on
-//! paper; columns share it, too, unless [`Panels::each_exposed`] is asked for.
+//! The lights stand side by side in twos, so that words can be read on a telephone. Below each are the
+//! target, the print, and a close-up of the print's dots where they vary most. All panels of a light share
+//! one exposure, that of the target, so a difference between them is a difference on paper; each light has
+//! its own, as an eye adapts. Pixels of the print have whole dots ([`Source::in_whole_dots`]).
 
 use readers::Pixels;
 
@@ -19,20 +20,24 @@ use super::tone::ToneCurve;
 /// The default lights: above the middle, beside it, and low enough to show only the body colour.
 pub const STANDARD_LIGHTS: [(&str, Light); 4] = [
     ("light at the eye", Light::Point([0.0, 0.0, 1.3])),
-    ("light from the left", Light::Point([-0.3, 0.2, 1.1])),
-    ("light from the right", Light::Point([0.3, -0.15, 1.1])),
+    ("light at left", Light::Point([-0.3, 0.2, 1.1])),
+    ("light at right", Light::Point([0.3, -0.15, 1.1])),
     ("raking light", Light::Point([0.0, 2.1, 1.4])),
 ];
 
-/// Far lights at four angles to an eye above: the reflection, two tilts, and the 45 degrees at which colours are measured.
+/// Far lights at four angles to an eye above: the reflection, two tilts, and the 45 degrees at which
+/// colours are measured.
 pub const TILTS: [(&str, Light); 4] = [
     ("in the reflection", Light::Far([0.0, 0.0, 1.0])),
     ("light 15° beside", Light::Far([0.258_819_045, 0.0, 0.965_925_826])),
     ("light 30° beside", Light::Far([0.5, 0.0, 0.866_025_404])),
-    ("straight on, light 45°", Light::Far([1.0, 0.0, 1.0])),
+    ("light 45° beside", Light::Far([1.0, 0.0, 1.0])),
 ];
 
 const GAP: usize = 16;
+
+/// Lights side by side.
+const ACROSS: usize = 2;
 
 /// Width of a dot in the close-up, in pixels.
 const MAGNIFIED: usize = 5;
@@ -46,15 +51,16 @@ pub struct Panels<'a> {
     width: usize,
     height: usize,
     rows: Vec<(&'static str, Vec<Radiance>)>,
-    /// Whether each light has an exposure of its own.
-    each: bool,
+    /// Lights side by side.
+    across: usize,
+    one_exposure: bool,
 }
 
 impl<'a> Panels<'a> {
-    /// Lights target and print. Panels have the print's proportions, and `longest` pixels on their longer side.
+    /// Lights target and print. Panels have the print's proportions, and at most `longest` pixels on their
+    /// longer side.
     ///
-    /// # Errors
-    /// Those of [`flat()`].
+    /// # Errors Those of [`flat()`].
     pub fn lit(
         target: &Source,
         print: &Source,
@@ -63,29 +69,23 @@ impl<'a> Panels<'a> {
         observer: &dyn Observer,
     ) -> Result<Panels<'a>, PreviewError> {
         check_size(longest, longest)?;
-        let (width, height) = print.fit(longest);
+        let (print, (width, height)) = print.in_whole_dots(longest);
         let only: Vec<Light> = lights.iter().map(|l| l.1).collect();
         let mut rows = vec![
             ("target", flat(target, &only, width, height, observer)?),
-            ("print, simulated", flat(print, &only, width, height, observer)?),
+            ("print, simulated", flat(&print, &only, width, height, observer)?),
         ];
-        if let Some(panels) = close_up(print, &only, width, height, observer)? {
+        if let Some(panels) = close_up(&print, &only, width, height, observer)? {
             rows.push(("the print's dots", panels));
         }
-        Ok(Panels { lights, width, height, rows, each: false })
+        Ok(Panels { lights, width, height, rows, across: ACROSS, one_exposure: false })
     }
 
-    /// Leaves the magnified dots out.
+    /// As a figure: all lights in a row, with one exposure, without the magnified dots.
     #[must_use]
-    pub fn without_dots(mut self) -> Panels<'a> {
+    pub fn in_a_row(mut self) -> Panels<'a> {
         self.rows.truncate(2);
-        self
-    }
-
-    /// Gives each light an exposure of its own, as an eye adapts.
-    #[must_use]
-    pub fn each_exposed(self) -> Panels<'a> {
-        Panels { each: true, ..self }
+        Panels { across: self.lights.len().max(1), one_exposure: true, ..self }
     }
 
     /// Lays them out. `title` stands above the picture and `notes` below it, one line each.
@@ -93,38 +93,40 @@ impl<'a> Panels<'a> {
     /// # Errors
     /// A picture larger than [`LONGEST_SIDE`](super::LONGEST_SIDE).
     pub fn picture(&self, title: &str, notes: &[String]) -> Result<Pixels<[u8; 3]>, PreviewError> {
-        let &Panels { lights, width, height, ref rows, each } = self;
+        let &Panels { lights, width, height, ref rows, across, one_exposure } = self;
         let target = &rows[0].1;
-        let tones: Vec<ToneCurve> = (0..target.len())
-            .map(|light| ToneCurve::of(if each { &target[light..=light] } else { target }))
-            .collect();
-
-        let head = GAP + Letters::Title.height() + GAP;
-        let label = Letters::Plain.height() + 6;
-        let foot = notes.len() * (Letters::Small.height() + 3) + GAP;
-        let wide = GAP + lights.len().max(1) * (width + GAP);
-        let mut canvas = Canvas::new(wide, head + rows.len() * (label + height + GAP) + foot)?;
-        canvas.text(GAP, GAP, Letters::Title, INK, title);
-        for (r, (name, panels)) in rows.iter().enumerate() {
-            let top = head + r * (label + height + GAP);
-            for (i, (panel, (light, _))) in panels.iter().zip(lights).enumerate() {
-                let left = GAP + i * (width + GAP);
-                let room = width / Letters::Plain.width();
-                let words = if i == 0 { format!("{name} · {light}") } else { (*light).to_string() };
-                canvas.text(left, top, Letters::Plain, INK, &shortened(&words, room));
-                canvas.paste(left, top + label, panel, tones[i]);
+        let tones: Vec<ToneCurve> = match one_exposure {
+            true => vec![ToneCurve::of(target); target.len()],
+            false => target.iter().map(ToneCurve::of_view).collect(),
+        };
+        let wide = GAP + across.min(lights.len().max(1)) * (width + GAP);
+        let letters = if one_exposure { Letters::Plain } else { Letters::readable(wide) };
+        let (line, head) = (letters.height() + 6, GAP + letters.height() + GAP);
+        let group = line + rows.len() * (line + height + GAP);
+        let groups = lights.len().div_ceil(across);
+        let foot = notes.len() * line + GAP;
+        let mut canvas = Canvas::new(wide, head + groups * group + foot)?;
+        let whole = |words: &str| shortened(words, (wide - 2 * GAP) / letters.width());
+        canvas.text(GAP, GAP, letters, INK, &whole(title));
+        for (i, (light, _)) in lights.iter().enumerate() {
+            let (left, top) = (GAP + i % across * (width + GAP), head + i / across * group);
+            let within = |words: &str| shortened(words, width / letters.width());
+            canvas.text(left, top, letters, INK, &within(light));
+            for (r, (name, panels)) in rows.iter().enumerate() {
+                let top = top + line + r * (line + height + GAP);
+                canvas.text(left, top, letters, FAINT, &within(name));
+                canvas.paste(left, top + line, &panels[i], tones[i]);
             }
         }
-        let below = head + rows.len() * (label + height + GAP);
         for (i, note) in notes.iter().enumerate() {
-            canvas.text(GAP, below + i * (Letters::Small.height() + 3), Letters::Small, FAINT, note);
+            canvas.text(GAP, head + groups * group + i * line, letters, FAINT, &whole(note));
         }
         Ok(canvas.finish())
     }
 }
 
-/// The dots of a sheet, magnified [`MAGNIFIED`] times, as `width` x `height` pixels under each of `lights`. `None` for
-/// sources without dots, and for sheets so small that a close-up would show nothing new.
+/// The dots of a sheet, magnified [`MAGNIFIED`] times, as `width` x `height` pixels under each of `lights`.
+/// `None` for sources without dots, and for sheets so small that a close-up would show nothing new.
 fn close_up(
     print: &Source,
     lights: &[Light],
@@ -203,9 +205,10 @@ mod tests {
             .unwrap()
             .picture("a sheet", &notes)
             .unwrap();
-        assert_eq!(picture.size().0 as usize, GAP + 4 * (60 + GAP));
-        let first = (2 * GAP + Letters::Title.height() + Letters::Plain.height() + 6) as u32;
-        let step = (Letters::Plain.height() + 6 + 40 + GAP) as u32;
+        assert_eq!(picture.size().0 as usize, GAP + 2 * (60 + GAP));
+        let line = Letters::Plain.height() + 6;
+        let first = (GAP + Letters::Plain.height() + GAP + 2 * line) as u32;
+        let step = (line + 40 + GAP) as u32;
         let mut seen = std::collections::BTreeSet::new();
         for y in first..first + 40 {
             for x in GAP as u32..picture.size().0 - GAP as u32 {
@@ -214,6 +217,28 @@ mod tests {
             }
         }
         assert!(seen.len() > 10, "only {} colours", seen.len());
+    }
+
+    /// Lines three dots apart are even where three dots are a pixel, and few dots have some pixels each.
+    #[test]
+    fn pixels_have_whole_dots() {
+        let space = Space::half_angle(8);
+        let stacks = vec![Stack::SUBSTRATE, "MS".parse().unwrap()];
+        let mut rows = Table::new(space.columns());
+        [0.27, 0.05].iter().for_each(|&f| rows.push(&vec![f; space.columns()]));
+        for (width, longest, panel) in [(250usize, 100, 83), (1000, 333, 250), (40, 100, 80)] {
+            let index = (0..width * 30).map(|i| u8::from(i % width % 3 == 0)).collect();
+            let paper = Paper::Custom { width: width as u16, length: 30 };
+            let sheet = Sheet::new(paper, stacks.clone(), index).unwrap();
+            let area = Area::whole(sheet.dots());
+            let print = Source::Print { dots: sheet.dots(), space: &space, stacks: &rows, area };
+            let (print, (across, down)) = print.in_whole_dots(longest);
+            assert_eq!(across, panel);
+            let seen = flat(&print, &[Light::Far([0.0, 0.0, 1.0])], across, down, &Silent).unwrap();
+            let values: std::collections::BTreeSet<u32> =
+                seen[0].pixels.iter().map(|p| (1e4 * p[0]) as u32).collect();
+            assert_eq!(values.len(), if panel == 83 { 1 } else { 2 }, "{width}: {values:?}");
+        }
     }
 
     #[test]

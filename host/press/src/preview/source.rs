@@ -1,11 +1,11 @@
 //! The reflectance of a document or a printed sheet, averaged over each pixel of a picture.
 //!
-//! Problem: a page has 30 million dots of up to 57 stacks, and a document may have as many pixels of curves. Neither fits in
-//! memory as reflectance.
-//! Method: pictures are made line by line, and a pixel is the mean over exactly the area it covers, with parts of dots and of
-//! pixels at its edges. A line of a sheet is a histogram of stacks for each pixel times the stacks' rows. A line of a
-//! factored document averages weights first. A line of any other document averages reflectance, at up to `samples` x
-//! `samples` places of a pixel.
+//! Problem: a page has 30 million dots of up to 57 stacks, and a document may have as many pixels of
+//! curves. Neither fits in memory as reflectance.
+//! Method: pictures are made line by line, and a pixel is the mean over exactly the area it covers, with
+//! parts of dots and of pixels at its edges. A line of a sheet is a histogram of stacks for each pixel
+//! times the stacks' rows. A line of a factored document averages weights first. A line of any other
+//! document averages reflectance, at up to `samples` x `samples` places of a pixel.
 //! Cost: one increment a dot, then one multiply-add for each column and stack in the pixel.
 //! Limits: averaging is linear in reflectance, as section 4.2 of the 2009 paper assumes of halftones.
 
@@ -33,7 +33,8 @@ pub enum Source<'a> {
         dots: &'a DotMap,
         /// The tabulation of `stacks`.
         space: &'a Space,
-        /// The reflectance (1/sr) of the dots' stacks: one row for each of [`DotMap::stacks`], in their order.
+        /// The reflectance (1/sr) of the dots' stacks: one row for each of [`DotMap::stacks`], in their
+        /// order.
         stacks: &'a Table,
         /// The part of the dots to show.
         area: Area,
@@ -66,11 +67,28 @@ impl<'a> Source<'a> {
         (side(w, w.max(h)).max(1), side(h, w.max(h)).max(1))
     }
 
-    /// The share of each basis or stack in every pixel of a `width` x `height` picture, row by row, as many values a pixel as
-    /// there are bases or stacks. `None` for a document that is not factored.
+    /// A picture in which each pixel has a whole number of dots a side, or each dot a whole number of
+    /// pixels, so that it shows no pattern that the dots do not have: the source without what is left of a
+    /// pixel at the right and below, and the size in pixels, at most `longest`. Sources without dots stay
+    /// as they are.
+    pub fn in_whole_dots(&self, longest: usize) -> (Source<'a>, (usize, usize)) {
+        let &Source::Print { dots, space, stacks, area } = self else { return (*self, self.fit(longest)) };
+        let most = area.width.max(area.length).max(1);
+        if most <= longest {
+            let times = longest / most;
+            return (*self, (area.width * times, area.length * times));
+        }
+        let side = most.div_ceil(longest);
+        let [width, height] = [area.width, area.length].map(|dots| (dots / side).max(1));
+        let whole =
+            Area { width: area.width.min(width * side), length: area.length.min(height * side), ..area };
+        (Source::Print { dots, space, stacks, area: whole }, (width, height))
+    }
+
+    /// The share of each basis or stack in every pixel of a `width` x `height` picture, row by row, as many
+    /// values a pixel as there are bases or stacks. `None` for a document that is not factored.
     ///
-    /// # Errors
-    /// A size out of range, or tables that do not match each other.
+    /// # Errors A size out of range, or tables that do not match each other.
     pub fn shares(&self, width: usize, height: usize) -> Result<Option<Vec<f32>>, PreviewError> {
         let lines = self.lines(width, height, 1)?;
         let Some(channels) = lines.table().map(Table::len) else { return Ok(None) };
@@ -91,8 +109,8 @@ impl<'a> Source<'a> {
 
     /// Prepares reading it line by line as `width` x `height` pixels.
     ///
-    /// `samples` limits the places averaged along each axis of a pixel of [`Source::Document`]; other sources are averaged
-    /// exactly, by area.
+    /// `samples` limits the places averaged along each axis of a pixel of [`Source::Document`]; other
+    /// sources are averaged exactly, by area.
     pub(super) fn lines(
         &self,
         width: usize,

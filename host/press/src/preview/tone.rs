@@ -1,17 +1,23 @@
 //! From radiance to the bytes of a picture.
 //!
-//! Method: one exposure for all pictures to compare, then a tone curve. It keeps darks and midtones, and compresses
-//! brighter values by `x / (x + room)` above the knee, so that a highlight a hundred times brighter than white keeps its
-//! shape. Half of the result is scaled by the largest channel (gold stays gold), the other half by each channel (the core
-//! of a highlight turns white, as on film). With the knee at white all colours up to it are kept, and brighter ones are cut
-//! off. sRGB coding by `palette`. Limits: display-referred; compare radiance, not bytes.
+//! Method: one exposure for all pictures to compare, then a tone curve. It keeps darks and midtones, and
+//! compresses brighter values by `x / (x + room)` above the knee, so that a highlight a hundred times
+//! brighter than white keeps its shape. Half of the result is scaled by the largest channel (gold stays
+//! gold), the other half by each channel (the core of a highlight turns white, as on film). With the knee
+//! at white all colours up to it are kept, and brighter ones are cut off. sRGB coding by `palette`. Limits:
+//! display-referred; compare radiance, not bytes.
 
 use palette::{LinSrgb, Srgb};
 
 use super::radiance::Radiance;
 
-/// The exposure maps the brighter middle of a picture to this: light enough for white paper, with room for highlights.
+/// The exposure maps the brighter middle of a picture to this: light enough for white paper, with room for
+/// highlights.
 const MIDDLE: f32 = 0.6;
+
+/// The curve for a view of a sheet is straight up to this part of white. Source: four fifths leave a
+/// highlight a fifth in which it keeps its shape.
+const STRAIGHT: f32 = 0.8;
 
 /// From radiance to display values: a factor, then the curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,34 +29,29 @@ pub struct ToneCurve {
 }
 
 impl ToneCurve {
-    /// For white paper facing a light of irradiance 1, which reflects about 0.85 / pi: it becomes slightly darker than white.
+    /// For white paper facing a light of irradiance 1, which reflects about 0.85 / pi: it becomes slightly
+    /// darker than white.
     pub const PAPER: ToneCurve = ToneCurve { exposure: 3.0, knee: 0.4 };
 
-    /// An exposure that keeps 70 % of the covered pixels of `pictures` below 0.6 of white. It is within a factor of 4 of
-    /// that of [`ToneCurve::PAPER`], so that black never looks white.
+    /// An exposure that keeps 70 % of the covered pixels of `pictures` below 0.6 of white. It is within a
+    /// factor of 4 of that of [`ToneCurve::PAPER`], so that black never looks white.
     pub fn of(pictures: &[Radiance]) -> ToneCurve {
         let paper = ToneCurve::PAPER;
         let exposure = ToneCurve::under_a_probe(pictures).exposure;
         ToneCurve { exposure: exposure.clamp(paper.exposure / 4.0, paper.exposure * 4.0), ..paper }
     }
 
-    /// The same without a limit: the light of a panorama has any strength, while lamps have an irradiance of 1. A picture that is
-    /// all black stays so.
+    /// The same without a limit: the light of a panorama has any strength, while lamps have an irradiance
+    /// of 1. A picture that is all black stays so.
     pub fn under_a_probe(pictures: &[Radiance]) -> ToneCurve {
-        let mut values: Vec<f32> = pictures
-            .iter()
-            .flat_map(|p| &p.pixels)
-            .filter(|p| p[3] > 0.5)
-            .map(|p| p[0].max(p[1]).max(p[2]))
-            .collect();
-        let paper = ToneCurve::PAPER;
-        if values.is_empty() {
-            return paper;
-        }
-        let at = (values.len() - 1) * 7 / 10;
-        let (_, bright, _) = values.select_nth_unstable_by(at, f32::total_cmp);
-        let exposure = MIDDLE / *bright;
-        if *bright > 1e-9 && exposure > 0.0 { ToneCurve { exposure, ..paper } } else { paper }
+        ToneCurve { exposure: exposure(pictures, 700, MIDDLE), ..ToneCurve::PAPER }
+    }
+
+    /// For a target under one light, and all that is compared with it: straight up to four fifths of white,
+    /// below which is all of it but the brightest two-hundredth. So a ground of a thirtieth of the light
+    /// looks like one, whatever the light.
+    pub fn of_view(target: &Radiance) -> ToneCurve {
+        ToneCurve { exposure: exposure(std::slice::from_ref(target), 995, STRAIGHT), knee: STRAIGHT }
     }
 
     /// The exposure so many stops above that of [`ToneCurve::PAPER`].
@@ -80,6 +81,21 @@ impl ToneCurve {
         let (over, room) = (v - self.knee, 1.0 - self.knee);
         if over <= 0.0 { v } else { self.knee + room * over / (over + room) }
     }
+}
+
+/// The factor that brings so many thousandths of the covered pixels to at most `value`; that of
+/// [`ToneCurve::PAPER`] for what is all black.
+fn exposure(pictures: &[Radiance], thousandths: usize, value: f32) -> f32 {
+    let covered = pictures.iter().flat_map(|p| &p.pixels).filter(|p| p[3] > 0.5);
+    let mut values: Vec<f32> = covered.map(|p| p[0].max(p[1]).max(p[2])).collect();
+    let paper = ToneCurve::PAPER.exposure;
+    if values.is_empty() {
+        return paper;
+    }
+    let at = (values.len() - 1) * thousandths / 1000;
+    let (_, bright, _) = values.select_nth_unstable_by(at, f32::total_cmp);
+    let found = value / *bright;
+    if *bright > 1e-9 && found > 0.0 { found } else { paper }
 }
 
 /// Encodes a linear colour from 0 to 1 as sRGB.
@@ -153,6 +169,21 @@ mod tests {
         }
         assert_eq!(ToneCurve::under_a_probe(&[picture(&[0.0; 9])]), ToneCurve::PAPER);
         assert_eq!(ToneCurve::under_a_probe(&[]), ToneCurve::PAPER);
+    }
+
+    /// What is a thirtieth of the brightest part looks like a thirtieth.
+    #[test]
+    fn a_view_keeps_the_ratios_of_its_target() {
+        for strength in [1e-4, 1.0, 50.0] {
+            let lit: Vec<f32> = [7.2; 40].into_iter().chain([0.24; 60]).map(|v| v * strength).collect();
+            let tone = ToneCurve::of_view(&picture(&lit));
+            let [bright, dark] = [lit[0], lit[99]].map(|v| tone.shown([v; 3])[0]);
+            assert!(
+                (bright - 0.8).abs() < 1e-6 && (dark * 30.0 / bright - 1.0).abs() < 1e-5,
+                "{bright} {dark}"
+            );
+        }
+        assert_eq!(ToneCurve::of_view(&picture(&[0.0; 9])).exposure, ToneCurve::PAPER.exposure);
     }
 
     #[test]

@@ -48,7 +48,7 @@ pub fn figure(
         let space = prepared.document.materials().space();
         let stacks = reflectances(dots.stacks(), &prepared.settings.library, space);
         let print = Source::Print { dots, space, stacks: &stacks, area: Area::whole(dots) };
-        let panels = Panels::lit(&prepared.target(), &print, &SIX_LIGHTS, 300, observer)?.without_dots();
+        let panels = Panels::lit(&prepared.target(), &print, &SIX_LIGHTS, 300, observer)?.in_a_row();
         return Ok(panels.picture(name, &[])?);
     }
     let bases = prepared.bases(observer)?;
