@@ -170,7 +170,8 @@ fn disagreement(a: &Document, b: &Document) -> Option<[String; 2]> {
 /// The curve of a measured BRDF, as its file has it: MERL `.binary`, RGL `.bsdf`, a goniometer's `.brdf`,
 /// or a curve's `.csv`.
 ///
-/// # Errors Files of another kind, and damage, with its place.
+/// # Errors
+/// Files of another kind, and damage, with its place.
 pub fn measured(shelf: &dyn Shelf, path: &Path, observer: &dyn Observer) -> Result<Curve, DocumentError> {
     let mut source = Source::new(shelf, observer);
     let head = source.head(path)?;

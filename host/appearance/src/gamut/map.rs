@@ -48,7 +48,8 @@ const COUNTS: f64 = 7e-5;
 /// if the intent uses them. The result depends on the input and the settings alone, not on the number of
 /// threads.
 ///
-/// # Errors Those of `factored`, and of the mapping.
+/// # Errors
+/// Those of `factored`, and of the mapping.
 pub fn map<'a, E: From<GamutError>>(
     pixels: &dyn Materials,
     factored: impl FnOnce() -> Result<Cow<'a, Factored>, E>,
@@ -157,7 +158,8 @@ pub struct Choice {
 /// Chooses the cartridges whose mixtures come nearest to a document: exactly for a sample of its pixels,
 /// while a mapping takes the first set within 0.1 %.
 ///
-/// # Errors Those of the mapping.
+/// # Errors
+/// Those of the mapping.
 pub fn choose(
     pixels: &dyn Materials,
     printable: &Printable,

@@ -12,13 +12,14 @@ use crate::brdf::{Space, Table};
 use crate::solve::{Fit, Hull, Mixer, MixtureError, Target};
 use crate::srgb::luminance;
 
-/// Shares below this bring a stack no cartridge. Source: a dot in two hundred, which is left out unless it is worth it.
+/// Shares below this bring a stack no cartridge. Source: a choice; a dot in two hundred, which is left out
+/// unless it is worth it.
 pub(super) const LEAST: f64 = 0.005;
 /// Shares below this are rare. Source: dots of three with this share lie .57 mm apart, a contrast of which
 /// an eye at .5 m sees a twentieth; more of them are a tone.
 const RARE: f64 = 0.05;
-/// How many times as bright as the mixture a rare stack is that stands out. Source: a share of a percent of it then changes the
-/// mean by less than it is seen.
+/// How many times as bright as the mixture a rare stack is that is looked at; whether it stays, the objective
+/// says. Source: a choice. At the share below which it is rare, such a stack adds a tenth to the mean.
 const BRIGHT: f64 = 3.0;
 /// Half angles in degrees that end a range in which brightness is compared: the middle of a sharp
 /// reflection, that of satin, its flanks, and the dark.

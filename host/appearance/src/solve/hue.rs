@@ -146,9 +146,7 @@ impl Hue {
         let weight = hue / if far > felt { far } else { felt };
         Missed { chromaticity: x, off, per, varies, weight, price: hue * huber }
     }
-}
 
-impl Hue {
     /// Whether the hue of a mixture with this mean reflectance is near enough to be that aimed at: red and
     /// blue beside green within half and one and a half of what they should be.
     pub fn is_kept(&self, aim: &Aim, mean: [f64; 3]) -> bool {

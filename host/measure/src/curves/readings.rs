@@ -65,7 +65,8 @@ pub struct FromReadings {
 /// Reads a file of readings: `format = 1`, `lab`, at least one of `gloss_20`, `gloss_60` and `gloss_85`,
 /// and `f0` for metals.
 ///
-/// # Errors Files that cannot be read, unknown keys, and readings out of range.
+/// # Errors
+/// Files that cannot be read, unknown keys, and readings out of range.
 pub fn read(path: &Path) -> Result<FromReadings, MeasureError> {
     let io = |source| MeasureError::Io { path: path.to_path_buf(), source };
     let found = std::fs::metadata(path).map_err(io)?;

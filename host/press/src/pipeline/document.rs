@@ -79,7 +79,8 @@ pub enum StageError {
 /// Halftones a document at the size it will have on a page of this layout. Detail finer than a cluster of
 /// dots is averaged before anything is fitted to it.
 ///
-/// # Errors Those of the stages; a size or a layout without room, and inks that the halftone cannot print,
+/// # Errors
+/// Those of the stages; a size or a layout without room, and inks that the halftone cannot print,
 /// are refused before the long work.
 pub fn halftoned(
     document: &Document,

@@ -60,7 +60,8 @@ impl<'a> Panels<'a> {
     /// Lights target and print. Panels have the print's proportions, and at most `longest` pixels on their
     /// longer side.
     ///
-    /// # Errors Those of [`flat()`].
+    /// # Errors
+    /// Those of [`flat()`].
     pub fn lit(
         target: &Source,
         print: &Source,

@@ -88,7 +88,8 @@ impl<'a> Source<'a> {
     /// The share of each basis or stack in every pixel of a `width` x `height` picture, row by row, as many
     /// values a pixel as there are bases or stacks. `None` for a document that is not factored.
     ///
-    /// # Errors A size out of range, or tables that do not match each other.
+    /// # Errors
+    /// A size out of range, or tables that do not match each other.
     pub fn shares(&self, width: usize, height: usize) -> Result<Option<Vec<f32>>, PreviewError> {
         let lines = self.lines(width, height, 1)?;
         let Some(channels) = lines.table().map(Table::len) else { return Ok(None) };

@@ -128,7 +128,8 @@ pub fn check(sheet: &Sheet, passes: &[Planned], rules: &[Rule]) -> Vec<Check> {
 ///
 /// More than [`MOST_CARTRIDGES`] inks are planned, with a check that forbids to send them.
 ///
-/// # Errors More than `MOST_PASSES` passes or `MOST_LAYERS` layers.
+/// # Errors
+/// More than `MOST_PASSES` passes or `MOST_LAYERS` layers.
 pub fn separate(sheet: &Sheet, rules: &[Rule], observer: &dyn Observer) -> Result<Separation, SeparateError> {
     observer.begin("separate", 2);
     let census = sheet.census();
@@ -190,7 +191,8 @@ pub fn passes(stacks: &[Stack]) -> (Vec<Ink>, Vec<u16>) {
 /// The sheet that passes print: each dot has the inks of the passes that have it, lowest first. `stacks`
 /// are the stacks to expect, numbered as the sheet will number them.
 ///
-/// # Errors Planes of another size than the paper, more than `MOST_PASSES`, a dot with inks that are no
+/// # Errors
+/// Planes of another size than the paper, more than `MOST_PASSES`, a dot with inks that are no
 /// stack.
 pub fn compose(paper: Paper, passes: &[Pass], stacks: &[Stack]) -> Result<Sheet, SeparateError> {
     let (width, length) = (usize::from(paper.width()), usize::from(paper.length()));

@@ -20,7 +20,8 @@ const CONES: Matrix = [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.
 /// The matrix from linear amounts of these primaries to linear Rec. 709; `None` if they are the same within
 /// what files round to.
 ///
-/// # Errors Primaries that do not span colours.
+/// # Errors
+/// Primaries that do not span colours.
 pub fn to_rec_709(primaries: &Primaries) -> Result<Option<Matrix>, String> {
     // Programs write them with three or four digits, so that equal ones differ by so much.
     const ALIKE: f32 = 0.001;

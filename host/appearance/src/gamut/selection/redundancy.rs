@@ -61,7 +61,8 @@ impl Search<'_> {
 /// All stacks, in their order, with what leaving them out costs in the metric with this weight of light.
 /// Stacks are left out together while each is missed by at most `limit`. The bare substrate always stays.
 ///
-/// # Errors Fewer than two stacks, or curves that cannot be fitted.
+/// # Errors
+/// Fewer than two stacks, or curves that cannot be fitted.
 pub fn redundancy(
     space: &Space,
     printable: &Printable,
