@@ -88,7 +88,7 @@ impl Choice for Intent {
         (
             Intent::Auto,
             "auto",
-            "Clamp, unless that merges more than 1 % of pairs of materials that differ and blend merges clearly fewer",
+            "Clamp, or blend if that keeps clearly more materials apart; with shine where that looks clearly nearer",
         ),
         (Intent::Basis, "basis", "Map the bases and keep the weights: relative differences survive"),
         (
@@ -101,6 +101,11 @@ impl Choice for Intent {
             Intent::Contrast,
             "contrast",
             "Clamp what the inks can make; elsewhere keep differences between neighbours, such as scratches and grain",
+        ),
+        (
+            Intent::Shine,
+            "shine",
+            "Clamp, and let mirrors that no ink reaches shine as the nearest metal instead of turning dark",
         ),
     ];
 }

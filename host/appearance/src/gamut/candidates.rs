@@ -5,8 +5,9 @@ use maths::Maths;
 
 use super::rare::Brightness;
 use super::settings::GamutSettings;
+use super::shine::Shine;
 use crate::brdf::{self, Space, Table};
-use crate::solve::{Hull, LAYER_PRICE, MixtureError, SMALL};
+use crate::solve::{Hull, LAYER_PRICE, MixtureError, SMALL, Target};
 
 /// The stacks that can be printed with the available inks, and their curves.
 #[derive(Clone, Debug, PartialEq)]
@@ -74,6 +75,8 @@ pub(super) struct Candidates {
     pub priced: Hull,
     /// Without the price, for reported distances.
     pub free: Hull,
+    /// How many times light counts, where a document is sharper than the inks.
+    pub shine: Option<Shine>,
 }
 
 impl Candidates {
@@ -90,6 +93,7 @@ impl Candidates {
             brightness: Brightness::new(space, curves),
             priced: Hull::new(space, curves, &price, light)?.in_clusters(clusters),
             free: Hull::new(space, curves, &vec![0.0; stacks.len()], light)?.in_clusters(clusters),
+            shine: None,
         })
     }
 
@@ -124,7 +128,28 @@ impl Candidates {
             curves,
             priced: self.priced.subset(keep),
             free: self.free.subset(keep),
+            shine: self.shine.clone(),
         }
+    }
+
+    /// A row (1/sr) as a target.
+    pub fn target(&self, row: &[f64]) -> Result<Target, MixtureError> {
+        let mut target = Target::default();
+        self.aim(row.iter().copied(), &mut target)?;
+        Ok(target)
+    }
+
+    /// Aims at a reflectance (1/sr).
+    pub fn aim(
+        &self,
+        reflectance: impl ExactSizeIterator<Item = f64>,
+        target: &mut Target,
+    ) -> Result<(), MixtureError> {
+        self.priced.aim(reflectance, target)?;
+        if let Some(shine) = &self.shine {
+            target.light = shine.times(&target.summary(&self.priced));
+        }
+        Ok(())
     }
 
     /// The distance in light between a mixture and a row of the space.

@@ -20,6 +20,7 @@ use super::selection::cartridges::{Cartridges, Precision};
 use super::selection::fitted::{Service, Targets};
 use super::selection::{cartridges, stacks};
 use super::settings::{GamutSettings, Gloss, Intent};
+use super::shine::Shine;
 use super::things::Things;
 use crate::brdf::{Space, Table};
 use crate::materials::{Factored, Materials, words};
@@ -59,7 +60,9 @@ pub fn map<'a, E: From<GamutError>>(
 ) -> Result<Mapped, E> {
     let document = Pixels::new(pixels, printable, settings)?;
     match settings.intent {
-        Intent::Clamp | Intent::Contrast => document.fitted(&document.choose(None, observer)?, observer),
+        Intent::Clamp | Intent::Contrast | Intent::Shine => {
+            document.fitted(&document.choose(None, observer)?, observer)
+        }
         Intent::Auto => {
             let chosen = document.choose(None, observer)?;
             if document.clamping_keeps(&chosen)? {
@@ -92,7 +95,8 @@ pub fn clamped(
     settings: &GamutSettings,
     observer: &dyn Observer,
 ) -> Result<Mapped, GamutError> {
-    let document = Pixels::new(pixels, printable, settings)?;
+    let settings = GamutSettings { intent: Intent::Clamp, ..settings.clone() };
+    let document = Pixels::new(pixels, printable, &settings)?;
     document.fitted(&document.choose(None, observer)?, observer)
 }
 
@@ -123,7 +127,11 @@ pub fn gain(
     check_stacks(more)?;
     let all = Candidates::wanted(space, more, settings).map_err(in_target("the stacks"))?;
     let rows = judged.rows.rows().enumerate();
-    let rows = rows.map(|(i, row)| all.free.target(row).map_err(in_target(format!("material {i}"))));
+    let rows = rows.map(|(i, row)| {
+        let mut target = all.free.target(row).map_err(in_target(format!("material {i}")))?;
+        target.light = judged.light[i];
+        Ok::<_, GamutError>(target)
+    });
     let targets = Targets {
         rows: rows.collect::<Result<_, _>>()?,
         importance: judged.importance.clone(),
@@ -166,7 +174,8 @@ pub fn choose(
     settings: &GamutSettings,
     observer: &dyn Observer,
 ) -> Result<Choice, GamutError> {
-    let settings = GamutSettings { intent: Intent::Clamp, ..settings.clone() };
+    let intent = if settings.intent.uses_bases() { Intent::Clamp } else { settings.intent };
+    let settings = GamutSettings { intent, ..settings.clone() };
     let document = Pixels::new(pixels, printable, &settings)?;
     let (targets, rows) = document.targets(None)?;
     let all = &document.all;
@@ -190,6 +199,8 @@ struct Pixels<'a> {
     sampled: Vec<usize>,
     sample: Table,
     things: Things,
+    /// What is done about materials that are sharper than the inks.
+    shine: Vec<String>,
 }
 
 /// The stacks that were chosen, and the cartridges that were not.
@@ -213,10 +224,14 @@ impl<'a> Pixels<'a> {
         settings: &'a GamutSettings,
     ) -> Result<Self, GamutError> {
         check_stacks(printable)?;
-        let all = Candidates::wanted(pixels.space(), printable, settings).map_err(in_target("the stacks"))?;
+        let mut all =
+            Candidates::wanted(pixels.space(), printable, settings).map_err(in_target("the stacks"))?;
         let sampled = sample::pixels(pixels.width() * pixels.height(), SAMPLE, settings.seed);
         let sample = sample::rows(pixels, &sampled);
-        Ok(Pixels { pixels, settings, all, sampled, sample, things: Things::find(pixels) })
+        let things = Things::find(pixels);
+        let shine =
+            shine(pixels.space(), &things, &mut all, settings).map_err(in_target("a sharp material"))?;
+        Ok(Pixels { pixels, settings, all, sampled, sample, things, shine })
     }
 
     /// What cartridges and stacks are chosen by: sampled pixels, each material that counts, and the bases,
@@ -226,7 +241,7 @@ impl<'a> Pixels<'a> {
         let mut targets = Targets { rows: Vec::new(), importance: Vec::new(), counted: Vec::new() };
         let mut add = |row: &[f64], importance: f64, counts: Option<f64>, what: String| {
             rows.push(row);
-            targets.rows.push(self.all.free.target(row).map_err(in_target(what))?);
+            targets.rows.push(self.all.target(row).map_err(in_target(what))?);
             targets.importance.push(importance);
             targets.counted.extend(counts.map(|share| (targets.rows.len() - 1, share)));
             Ok::<_, GamutError>(())
@@ -274,14 +289,16 @@ impl<'a> Pixels<'a> {
 
     /// Chooses cartridges, and the stacks that they print.
     fn choose(&self, bases: Option<&Factored>, observer: &dyn Observer) -> Result<Chosen, GamutError> {
+        self.shine.iter().for_each(|words| observer.note(words));
         let (targets, rows) = self.targets(bases)?;
         let (cartridges, given_up) = self.cartridges((&targets, &rows), observer)?;
         let stacks =
             stacks::choose(&self.all, &cartridges.stacks, &targets).map_err(in_target("choosing stacks"))?;
         let candidates = self.all.subset(&stacks);
         check_number(&candidates.stacks)?;
+        let light = targets.rows.iter().map(|target| target.light).collect();
         let Targets { importance, counted, .. } = targets;
-        let judged = Judged { rows, importance, counted, objective: cartridges.fitted.loss.sqrt() };
+        let judged = Judged { rows, light, importance, counted, objective: cartridges.fitted.loss.sqrt() };
         Ok(Chosen { candidates, given_up, judged })
     }
 
@@ -330,7 +347,7 @@ impl<'a> Pixels<'a> {
                         observer,
                     )?;
                 }
-                Intent::Clamp
+                if candidates.shine.is_some() { Intent::Shine } else { Intent::Clamp }
             }
         };
         let pixels = self.report(&clamped, kept);
@@ -510,6 +527,31 @@ impl<'a> Pixels<'a> {
         }
         report.cartridges = mix.inks();
         Ok(Mapped { mix, report, judged: judged.clone() })
+    }
+}
+
+/// Lets light count more where the intent wants that, and says so.
+fn shine(
+    space: &Space,
+    things: &Things,
+    all: &mut Candidates,
+    settings: &GamutSettings,
+) -> Result<Vec<String>, MixtureError> {
+    let asked = settings.intent == Intent::Shine;
+    let nothing = |why: &str| Ok(vec![format!("intent `shine` changes nothing: {why}")]);
+    match () {
+        () if !asked && settings.intent != Intent::Auto => Ok(Vec::new()),
+        () if settings.light > 0.0 && settings.hue => {
+            let (shine, said) = Shine::find(space, things, all, asked)?;
+            all.shine = shine;
+            if asked && all.shine.is_none() {
+                return nothing("no material of this document is sharper than the inks");
+            }
+            Ok(said)
+        }
+        () if !asked => Ok(Vec::new()),
+        () if settings.hue => nothing("the metric of the paper does not weigh light"),
+        () => nothing("of two pictures the contrast of both decides"),
     }
 }
 

@@ -12,6 +12,7 @@
 //! that for contrast. Limits: the mixture is exact only for light that does not scatter sideways in the
 //! paper.
 
+mod balls;
 mod candidates;
 mod error;
 mod fitting;
@@ -21,6 +22,7 @@ mod result;
 mod sample;
 mod selection;
 mod settings;
+mod shine;
 #[cfg(test)]
 mod tests;
 mod things;

@@ -6,8 +6,8 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Intent {
-    /// Clamp, unless that merges more than 1 % of the pairs of different materials and blending at least a
-    /// fifth fewer; then blend.
+    /// Clamp, or blend if clamping merges more than 1 % of the pairs of different materials and blending at
+    /// least a fifth fewer; with shine where it makes balls look at least a fifth better.
     #[default]
     Auto,
     /// Map the bases and keep the weights: relative differences survive.
@@ -19,6 +19,9 @@ pub enum Intent {
     /// Clamp in the gamut; outside it, keep differences between neighbouring pixels at the price of
     /// closeness.
     Contrast,
+    /// Clamp, and print materials that reflect more sharply than any ink as those that return as much light
+    /// as makes their balls look most alike.
+    Shine,
 }
 
 impl Intent {

@@ -2,6 +2,7 @@
 
 mod dark;
 mod needed;
+mod shine;
 
 use inks::{Curve, InkSet, Library, Stack};
 use proptest::prelude::*;

@@ -101,9 +101,10 @@ pub struct Hull {
     pub(super) by_column: Columns,
     pub(super) price: Vec<f64>,
     pub(super) darkest: f64,
-    /// The weighted cube roots of every stack by itself, by column, and the square of their length.
+    /// The cube roots of every stack by itself, by column, and the squares of their weighted lengths, without
+    /// light and of light alone.
     looks: Columns,
-    sizes: Vec<f64>,
+    sizes: Vec<[f64; 2]>,
     /// What the squared distance of every stack from the target counts in a mixture, by its share:
     /// [`GRAIN`] or, without a weight for light, nothing.
     grain: f64,
@@ -116,6 +117,8 @@ pub struct Target {
     pub(super) root: Vec<f64>,
     /// Its hue away from the highlight, if the hull knows it.
     pub(super) hue: Option<Aim>,
+    /// How many times the weight that the hull gives to light it has for this target.
+    pub(crate) light: f64,
 }
 
 impl Target {
@@ -198,7 +201,7 @@ impl Hull {
         }
         let darkest = DARKEST * if brightest > 0.0 { brightest } else { 1.0 };
         let darkest = darkest.max(f64::MIN_POSITIVE);
-        let (looks, sizes) = looks(&rows, &weight, darkest);
+        let (looks, sizes) = looks(&rows, &weight, m, darkest);
         Ok(Hull {
             radiance: space.radiance().to_vec(),
             grain: if light_of_radiance.is_empty() { 0.0 } else { GRAIN },
@@ -219,7 +222,7 @@ impl Hull {
         let mut rows = Table::new(self.rows.columns());
         stacks.iter().for_each(|&k| rows.push(self.rows.row(k)));
         let price = stacks.iter().map(|&k| self.price[k]).collect();
-        let (looks, sizes) = looks(&rows, &self.weight, self.darkest);
+        let (looks, sizes) = looks(&rows, &self.weight, self.curve_columns(), self.darkest);
         Hull {
             radiance: self.radiance.clone(),
             light: self.light.clone(),
@@ -308,6 +311,7 @@ impl Hull {
         target
             .radiance
             .extend(reflectance.zip(&self.radiance).map(|(f, c)| if f < 0.0 { 0.0 } else { f * c }));
+        target.light = 1.0;
         target.hue = self.hue.as_ref().map(|hue| hue.aim(hue.mean(&target.radiance)));
         append_albedo(&self.light, &mut target.radiance);
         target.radiance.resize(self.columns(), 0.0);
@@ -341,17 +345,30 @@ impl Hull {
         hue.is_kept(aim, mean)
     }
 
-    /// The squared distance of every stack by itself from a target, light included.
+    /// The weights of the columns for a target.
     #[inline(always)]
-    pub(super) fn apart(&self, target: &Target, wanted: &mut [f64], out: &mut [f64]) {
+    pub(super) fn weigh(&self, target: &Target, weight: &mut Vec<f64>) {
+        weight.clear();
+        weight.extend_from_slice(&self.weight);
+        if !self.light.is_empty() {
+            weight[self.curve_columns()..][..3].iter_mut().for_each(|weight| *weight *= target.light);
+        }
+    }
+
+    /// The squared distance of every stack by itself from a target whose columns have these weights, light
+    /// included.
+    #[inline(always)]
+    pub(super) fn apart(&self, target: &Target, weight: &[f64], wanted: &mut [f64], out: &mut [f64]) {
         let mut size = 0.0;
-        for ((wanted, root), weight) in wanted.iter_mut().zip(&target.root).zip(&self.weight) {
-            *wanted = root * weight;
-            size += *wanted * *wanted;
+        for ((wanted, root), weight) in wanted.iter_mut().zip(&target.root).zip(weight) {
+            let weighted = root * weight;
+            *wanted = weighted * weight;
+            size += weighted * weighted;
         }
         self.looks.multiply(wanted, out);
-        for (out, own) in out.iter_mut().zip(&self.sizes) {
-            let squared = own + size - 2.0 * *out;
+        let light = target.light * target.light;
+        for (out, [own, own_light]) in out.iter_mut().zip(&self.sizes) {
+            let squared = own + light * own_light + size - 2.0 * *out;
             *out = if squared > 0.0 { squared } else { 0.0 };
         }
     }
@@ -377,13 +394,18 @@ impl Hull {
     }
 }
 
-/// The weighted cube roots of stacks by column, and the square of the length of each.
-fn looks(rows: &Table, weight: &[f64], darkest: f64) -> (Columns, Vec<f64>) {
+/// The cube roots of stacks by column, and the squares of the weighted lengths of each: of the first
+/// `curve` columns, and of those of light.
+fn looks(rows: &Table, weight: &[f64], curve: usize, darkest: f64) -> (Columns, Vec<[f64; 2]>) {
     let mut looks = Table::new(rows.columns());
     let mut sizes = Vec::new();
     for row in rows.rows() {
-        let look: Vec<f64> = row.iter().zip(weight).map(|(&f, w)| w * root_of(f.max(darkest))).collect();
-        sizes.push(look.iter().map(|v| v * v).sum());
+        let look: Vec<f64> = row.iter().map(|&f| root_of(f.max(darkest))).collect();
+        let length = |range: std::ops::Range<usize>| {
+            let columns = look[range.clone()].iter().zip(&weight[range]);
+            columns.map(|(root, weight)| (root * weight).squared()).sum()
+        };
+        sizes.push([length(0..curve), length(curve..look.len())]);
         looks.push(&look);
     }
     (Columns::of_rows(&looks), sizes)

@@ -110,6 +110,8 @@ pub struct Best {
 pub struct Mixer {
     simplex: Simplex,
     gram: Gram,
+    /// Weights of the columns for the target.
+    weight: Vec<f64>,
     /// Radiance of the mixture, its change over the full step, and the trial mixture.
     mix: Vec<f64>,
     change: Vec<f64>,
@@ -152,6 +154,7 @@ impl Mixer {
         Mixer {
             simplex: Simplex::new(),
             gram: Gram::empty(),
+            weight: Vec::new(),
             mix: Vec::new(),
             change: Vec::new(),
             trial: Vec::new(),
@@ -174,7 +177,8 @@ impl Mixer {
     }
 
     #[inline(always)]
-    fn resize(&mut self, hull: &Hull) {
+    fn prepare(&mut self, hull: &Hull, target: &Target) {
+        hull.weigh(target, &mut self.weight);
         let (k, m) = (hull.len(), hull.columns());
         for columns in [
             &mut self.mix,
@@ -209,8 +213,8 @@ impl Mixer {
             a[i] = 1.0;
             a
         };
-        self.resize(hull);
-        hull.apart(target, &mut self.change, &mut self.apart);
+        self.prepare(hull, target);
+        hull.apart(target, &self.weight, &mut self.change, &mut self.apart);
         let mut nearest: Vec<(f64, usize)> = self.apart.iter().copied().zip(0..).collect();
         nearest.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         starts.extend(nearest.iter().take(4).map(|&(_, i)| single(i)));
@@ -232,8 +236,8 @@ impl Mixer {
     /// The objective of a mixture, without the price of layers.
     #[cfg(test)]
     pub(crate) fn objective(&mut self, hull: &Hull, target: &Target, a: &[f64]) -> f64 {
-        self.resize(hull);
-        hull.apart(target, &mut self.change, &mut self.apart);
+        self.prepare(hull, target);
+        hull.apart(target, &self.weight, &mut self.change, &mut self.apart);
         hull.costs(&self.apart, &mut self.cost);
         hull.mix(a, &mut self.mix);
         self.trial.copy_from_slice(&self.mix);
@@ -277,18 +281,18 @@ impl Mixer {
         a: &mut [f64],
     ) -> Result<(), MixtureError> {
         check(hull, target, a)?;
-        self.resize(hull);
+        self.prepare(hull, target);
         // The tangent at black is vertical: targets below a millionth of the brightest stack use the
         // tangent there.
         let floor = hull.darkest / DARKEST * 1e-6;
         for (j, s) in self.stiffness.iter_mut().enumerate() {
             let root = inverse_cbrt(target.radiance[j].max(floor));
             *s = match metric {
-                Linear::Tangent => hull.weight[j] * root * root / 3.0,
-                Linear::Plain => hull.weight[j],
+                Linear::Tangent => self.weight[j] * root * root / 3.0,
+                Linear::Plain => self.weight[j],
             };
         }
-        hull.apart(target, &mut self.change, &mut self.apart);
+        hull.apart(target, &self.weight, &mut self.change, &mut self.apart);
         let nearest = (0..a.len()).min_by(|&i, &k| self.apart[i].total_cmp(&self.apart[k]));
         a.fill(0.0);
         a[nearest.ok_or(MixtureError::NoStacks)?] = 1.0;
@@ -384,10 +388,10 @@ impl Mixer {
         enough: f64,
     ) -> Result<(Fit, f64), MixtureError> {
         check(hull, target, a)?;
-        self.resize(hull);
+        self.prepare(hull, target);
         self.closed.clear();
         self.closed.extend(a.iter().map(|&w| matches!(reach, Reach::Support) && w <= 0.0));
-        hull.apart(target, &mut self.change, &mut self.apart);
+        hull.apart(target, &self.weight, &mut self.change, &mut self.apart);
         hull.costs(&self.apart, &mut self.cost);
         hull.mix(a, &mut self.mix);
         self.trial.copy_from_slice(&self.mix);
@@ -466,7 +470,7 @@ impl Mixer {
     #[inline(always)]
     fn solve_model(&mut self, hull: &Hull, target: &Target, a: &[f64]) -> Result<(), SimplexError> {
         let m = hull.columns();
-        let (inverse, t, weight) = (&self.inverse[..m], &target.root[..m], &hull.weight[..m]);
+        let (inverse, t, weight) = (&self.inverse[..m], &target.root[..m], &self.weight[..m]);
         let stiffness = &mut self.stiffness[..m];
         for j in 0..m {
             let r = inverse[j];
@@ -576,7 +580,7 @@ impl Mixer {
     #[inline(always)]
     fn linearise(&mut self, hull: &Hull, target: &Target, spent: f64) -> Value {
         let m = self.trial.len();
-        let (mix, t, weight) = (&self.trial[..m], &target.root[..m], &hull.weight[..m]);
+        let (mix, t, weight) = (&self.trial[..m], &target.root[..m], &self.weight[..m]);
         let pull = &mut self.pull[..m];
         // Loops without sums, so that the compiler can vectorise over the columns.
         let inverse = &mut self.inverse[..m];

@@ -93,7 +93,7 @@ fn map_rows(rows: &Table, candidates: &Candidates) -> Result<Vec<Mapping>, Gamut
 }
 
 fn map_row(row: &[f64], candidates: &Candidates, mixer: &mut Mixer) -> Result<Mapping, MixtureError> {
-    let target = candidates.free.target(row)?;
+    let target = candidates.target(row)?;
     let best = mixer.best(&candidates.priced, &target)?;
     let mut weights = best.weights.clone();
     // The price has selected the stacks; the final weights minimise the distance alone.

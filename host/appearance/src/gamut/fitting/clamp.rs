@@ -101,7 +101,8 @@ pub(crate) fn rows(candidates: &Candidates, targets: &Table) -> Result<Table, Ga
     let fit = |mixer: &mut Mixer, i: usize| {
         let mut weights = vec![0.0; candidates.len()];
         let hull = &candidates.priced;
-        hull.target(targets.row(i))
+        candidates
+            .target(targets.row(i))
             .and_then(|target| {
                 mixer.tangent(hull, &target, &mut weights)?;
                 mixer.refine(hull, &target, &mut weights, ENOUGH)
@@ -163,7 +164,7 @@ impl Walker {
     ) -> Result<Met, MixtureError> {
         pixels.reflectance(pixel, &mut self.row);
         let hull = &candidates.priced;
-        hull.aim(self.row.iter().map(|&f| f64::from(f)), &mut self.target)?;
+        candidates.aim(self.row.iter().map(|&f| f64::from(f)), &mut self.target)?;
         let found = self.recent.start(hull, &self.target, &mut self.start);
         if found.is_none() {
             self.mixer.tangent(hull, &self.target, &mut self.start)?;

@@ -61,7 +61,7 @@ impl<'a> Solver<'a> {
     pub fn aim(&mut self, pixel: usize) -> Result<(), MixtureError> {
         self.pixels.reflectance(pixel, &mut self.row);
         let hull = &self.candidates.priced;
-        hull.aim(self.row.iter().map(|&f| f64::from(f)), &mut self.target)?;
+        self.candidates.aim(self.row.iter().map(|&f| f64::from(f)), &mut self.target)?;
         self.wanted.copy_from_slice(self.target.roots());
         for ((look, root), weight) in self.look.iter_mut().zip(&self.wanted).zip(hull.metric()) {
             *look = root * weight;

@@ -27,6 +27,8 @@ pub struct Judged {
     pub importance: Vec<f64>,
     /// Which of them are materials that count, and the share of the document that each covers.
     pub counted: Vec<(usize, f64)>,
+    /// How many times light counts for each.
+    pub light: Vec<f64>,
     /// The root mean square of the objective with the cartridges chosen.
     pub objective: f64,
 }

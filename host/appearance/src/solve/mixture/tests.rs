@@ -101,7 +101,7 @@ fn slopes_are_the_gradient_of_the_squared_distance() {
     let target = hull.target(&target_row).unwrap();
     let a: Vec<f64> = (0..57).map(|i| f64::from((i * 37) % 57 + 1) / (57.0 * 29.0)).collect();
     let mut mixer = Mixer::new();
-    mixer.resize(&hull);
+    mixer.prepare(&hull, &target);
     hull.mix(&a, &mut mixer.trial);
     mixer.linearise(&hull, &target, 0.0);
     for i in 0..57 {
@@ -534,4 +534,19 @@ fn a_second_solver_finds_no_lower_objective() {
         }
         assert!(best.fit.objective <= least + 1e-6, "{case}: {} {least}, {:?}", best.fit.objective, best.fit);
     }
+}
+
+/// A target for which light counts so many times is fitted as by a hull that gives light so much weight.
+#[test]
+fn light_that_counts_more_for_a_target_is_light_of_more_weight() {
+    let space = Space::half_angle(16);
+    let curves = library(&space);
+    let hull = |light: f64| Hull::new(&space, &curves, &vec![0.0; curves.len()], light).unwrap();
+    let row: Vec<f64> = mixture(&curves, &vec![1.0 / 57.0; 57]).iter().map(|f| 3.0 * f).collect();
+    let mut target = hull(0.28).target(&row).unwrap();
+    target.light = 2.5;
+    let found = Mixer::new().best(&hull(0.28), &target).unwrap();
+    let right = Mixer::new().best(&hull(0.7), &hull(0.7).target(&row).unwrap()).unwrap();
+    assert!((found.fit.objective - right.fit.objective).abs() < 1e-9, "{:?} {:?}", found.fit, right.fit);
+    assert!((found.fit.distance - right.fit.distance).abs() < 1e-9);
 }
