@@ -4,6 +4,8 @@ use std::error::Error as StdError;
 
 use appearance::brdf::plot::PlotError;
 use appearance::factor::FactorError;
+use appearance::gamut::GamutError;
+use appearance::weights::WeightError;
 use halftone::HalftoneError;
 use observe::Diagnosis;
 use press::pipeline::JobError;
@@ -54,6 +56,12 @@ pub enum Error {
 impl From<FactorError> for Error {
     fn from(error: FactorError) -> Error {
         StageError::from(error).into()
+    }
+}
+
+impl From<WeightError> for Error {
+    fn from(error: WeightError) -> Error {
+        StageError::from(GamutError::from(error)).into()
     }
 }
 

@@ -63,7 +63,7 @@ impl Print {
     pub fn made(self, observer: &dyn Observer) -> Result<Made, Error> {
         let prove = |print: &Print| Made::proved(&print.request(), &print.settings.page, observer);
         let (mut made, seen) = self.seen(prove, observer)?;
-        made.job.draft.plan.notes = seen.notes();
+        seen.complete(&mut made.job.draft.plan);
         Ok(made.of(Subject::Document(Box::new(seen))))
     }
 }
@@ -146,9 +146,7 @@ impl Made {
             // The page is the simulated sheet, dot for dot.
             ("preview.png", _) => Ok(sheet_in_inks(sheet, laid.area, across, self.ground)?),
             ("separation.png", _) => Ok(sheet.in_colours(laid.area, plan.resolution_dpi)?),
-            ("sheet.png", Subject::Document(seen)) => {
-                Ok(seen.sheet(self.job.draft.separation.passes.len(), observer)?.png()?)
-            }
+            ("sheet.png", Subject::Document(seen)) => Ok(seen.sheet(plan, observer)?.png()?),
             ("materials.png", Subject::Document(seen)) => Ok(seen.materials(observer)?.png()?),
             _ => {
                 let mut passes = self.printout.passes.iter().enumerate();
@@ -185,6 +183,7 @@ impl Made {
             "program": concat!("foilpress ", env!("CARGO_PKG_VERSION")),
             "document": { "name": self.plan().document },
             "plan": self.plan(),
+            "modelled": self.plan().modelled(),
             "job": { "bytes": self.job.bytes.len() },
         });
         let more = match &self.subject {

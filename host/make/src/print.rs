@@ -9,25 +9,29 @@
 
 use appearance::brdf::reflectances;
 use appearance::document::Document;
-use appearance::factor::{FactorSettings, Factored};
+use appearance::factor::{self, FactorReport, FactorSettings, Factored, Factoring};
 use appearance::gamut::{GamutSettings, InkMix, Printable};
+use appearance::materials::{Reduced, resolution};
 use appearance::srgb::luminance;
 use halftone::metrics::{self, Look, Tone};
 use inks::{InkSet, Library};
 use maths::Maths;
 use observe::{Beside, Diagnosis, Fault, Observer};
+use press::job::plan::Plan;
 use press::layout::Mm;
 use press::pipeline::document::{self, Halftoned};
 use press::pipeline::{self, Draft, Request};
 use press::preview::gloss::{self, Gloss};
 use press::preview::{
-    self, Contrasts, EYE, FidelityReport, Panels, Probe, STANDARD_LIGHTS, Source, Spectrum, Swatch, TILTS,
+    self, Contrasts, EYE, FidelityReport, Heading, Panels, Probe, STANDARD_LIGHTS, Source, Spectrum, Swatch,
+    TILTS,
 };
 use protocol::ink::Ink;
 use rayon::prelude::*;
 use readers::Pixels;
 use serde_json::{Value, json};
 use sheet::Area;
+use view::fit;
 
 use crate::options::HALFTONE;
 use crate::shown::{Mixture, Shown};
@@ -36,6 +40,10 @@ use crate::{Error, PageSettings, report};
 
 /// Bases of a document whose print needs none, so that the picture of it is close.
 const BASES: usize = 12;
+/// Bases of a document that is shown beside its print, and places along its longer side: most pixels of a
+/// leaf are then within .005 of their own look, where .01 is barely visible, in two seconds.
+const FEW: usize = 8;
+const OUTLINE: usize = 512;
 /// Pixels of the longer side of a panel in `sheet.png`.
 const PANEL: usize = 480;
 /// Pixels across a ball in `materials.png`.
@@ -94,11 +102,11 @@ pub struct Print {
 }
 
 impl Print {
-    /// The dots of a document. What is known of two pictures on them is added to its notes.
+    /// The dots of a document.
     ///
     /// # Errors
     /// Those of the stages, and two pictures of which one would not be seen.
-    pub fn new(mut document: Document, settings: &Settings, observer: &dyn Observer) -> Result<Print, Error> {
+    pub fn new(document: Document, settings: &Settings, observer: &dyn Observer) -> Result<Print, Error> {
         let halftoned = document::halftoned(
             &document,
             &settings.library,
@@ -107,15 +115,14 @@ impl Print {
             observer,
         )?;
         let contrasts = contrasts(&document, &settings.library, &halftoned)?;
-        if let Some(contrasts) = &contrasts {
-            if let Some(name) = contrasts.lost() {
-                let lost = format!("nothing is left of {name} in the print: {contrasts}");
-                return Err(Diagnosis::new(Fault::Setting, lost)
-                    .hint("allow more inks, print larger, or give the other picture less contrast")
-                    .set("inks", "all")
-                    .into());
-            }
-            document.notes.push(contrasts.to_string());
+        if let Some((contrasts, name)) =
+            contrasts.as_ref().and_then(|contrasts| Some((contrasts, contrasts.lost()?)))
+        {
+            let lost = format!("nothing is left of {name} in the print: {contrasts}");
+            return Err(Diagnosis::new(Fault::Setting, lost)
+                .hint("allow more inks, print larger, or give the other picture less contrast")
+                .set("inks", "all")
+                .into());
         }
         Ok(Print { document, settings: settings.clone(), halftoned, contrasts })
     }
@@ -126,7 +133,8 @@ impl Print {
     /// A layout without room.
     pub fn draft(&self, observer: &dyn Observer) -> Result<Draft, Error> {
         let mut draft = pipeline::draft(&self.request(), observer)?;
-        draft.plan.notes = self.notes(&self.gloss());
+        draft.plan.notes.clone_from(&self.document.notes);
+        draft.plan.look = self.look(&self.gloss());
         Ok(draft)
     }
 
@@ -151,12 +159,8 @@ impl Print {
                     || print.fidelity(&beside),
                     || {
                         let halftone = Halftone::measured(print, &mix, &beside)?;
-                        let mixture = print
-                            .document
-                            .as_factored()
-                            .map(|document| Mixture::of(&mix, &print.settings.library, &document.space));
-                        drop(mix);
-                        Ok::<_, Error>((halftone, mixture))
+                        let space = print.document.materials().space();
+                        Ok::<_, Error>((halftone, Mixture::of(mix, &print.settings.library, space)?))
                     },
                 )
             },
@@ -179,12 +183,13 @@ impl Print {
         materials.map(|material| Gloss::of(space, material, lowest)).collect()
     }
 
-    /// What there is to say of the document beside the plan: what was assumed, and its gloss.
-    fn notes(&self, gloss: &[Gloss]) -> Vec<String> {
+    /// How the print will look, in sentences: two pictures, and gloss.
+    fn look(&self, gloss: &[Gloss]) -> Vec<String> {
         let materials = &self.halftoned.mapped.report.materials;
         let shares: Vec<(f64, Gloss)> =
             materials.iter().map(|m| m.share).zip(gloss.iter().copied()).collect();
-        self.document.notes.iter().cloned().chain(gloss::sentences(&shares)).collect()
+        let contrasts = self.contrasts.iter().map(Contrasts::to_string);
+        contrasts.chain(gloss::sentences(&shares)).collect()
     }
 
     /// How the document's bases for pictures of it are found, unless it came with bases.
@@ -201,6 +206,22 @@ impl Print {
     /// Those of factoring.
     pub fn bases(&self, observer: &dyn Observer) -> Result<Factored, Error> {
         Ok(document::factored(&self.document, &self.factoring(), observer)?.0.into_owned())
+    }
+
+    /// The document as mixtures of a few materials, as the page of the sheet shows it beside the print: found where
+    /// the page has places, in a second or two.
+    fn outline(&self, observer: &dyn Observer) -> Result<Factoring, Error> {
+        let document = self.document.materials();
+        let pixels = (document.width(), document.height());
+        let settings = FactorSettings {
+            bases: Some(FEW),
+            seed: self.settings.dots.factor.seed,
+            ..FactorSettings::default()
+        };
+        Ok(match resolution(pixels, fit(pixels, OUTLINE)) {
+            Some(cells) => factor::outline(&Reduced::new(document, cells), &settings, observer)?,
+            None => factor::outline(document, &settings, observer)?,
+        })
     }
 
     /// Whether bases were mapped, and not pixels.
@@ -282,17 +303,18 @@ pub struct Seen {
     pub replay: String,
     gloss: Vec<Gloss>,
     halftone: Halftone,
-    mixture: Option<Mixture>,
+    mixture: Mixture,
 }
 
 impl Seen {
-    /// What there is to say of the document beside the plan.
-    pub(crate) fn notes(&self) -> Vec<String> {
-        self.print.notes(&self.gloss)
+    /// Completes a plan by what there is to say of the document and its print.
+    pub(crate) fn complete(&self, plan: &mut Plan) {
+        plan.notes.clone_from(&self.print.document.notes);
+        plan.look = self.print.look(&self.gloss);
     }
 
     /// Document and print side by side, with the number of passes below.
-    pub(crate) fn sheet(&self, passes: usize, observer: &dyn Observer) -> Result<Pixels<[u8; 3]>, Error> {
+    pub(crate) fn sheet(&self, plan: &Plan, observer: &dyn Observer) -> Result<Pixels<[u8; 3]>, Error> {
         let Print { document, settings, halftoned, contrasts } = &self.print;
         let (dots, space) = (&halftoned.dots, document.materials().space());
         let stacks = reflectances(dots.stacks(), &settings.library, space);
@@ -302,11 +324,12 @@ impl Seen {
         let panels = Panels::lit(&target, &printed, lights, PANEL, observer)?;
         let (width, height) = (Mm::of_dots(dots.width() as i64).0, Mm::of_dots(dots.length() as i64).0);
         let notes = [
-            format!("{width:.0} x {height:.0} mm, {passes} passes"),
+            format!("{width:.0} x {height:.0} mm, {} passes", plan.passes.len()),
             format!("seen from {EYE} m: mean d {:.3},", self.fidelity.mean),
             format!("95 % below {:.3}", self.fidelity.p95),
         ];
-        Ok(panels.picture(&document.name, &notes)?)
+        let heading = Heading { title: &document.name, modelled: !plan.modelled().is_empty() };
+        Ok(panels.picture(heading, &notes)?)
     }
 
     /// Materials before and after mapping, as balls.
@@ -331,26 +354,41 @@ impl Seen {
             }
         };
         let space = document.materials().space();
-        Ok(preview::materials_picture(space, &swatches, probe, BALL, observer)?)
+        let mixed = swatches.iter().flat_map(|swatch| swatch.mix.iter().map(|(stack, _)| stack));
+        let modelled = !settings.library.modelled(mixed).is_empty();
+        Ok(preview::materials_picture(space, &swatches, probe, BALL, modelled, observer)?)
     }
 
     /// The page on which light follows the hand.
     pub(crate) fn light(&self, observer: &dyn Observer) -> Result<String, Error> {
         let Print { document, settings, halftoned, .. } = &self.print;
+        let (outline, also);
+        let (target, replay) = match document.as_factored() {
+            Some(factored) => {
+                also = String::new();
+                (factored, self.replay.as_str())
+            }
+            None => {
+                outline = self.print.outline(observer)?;
+                let FactorReport { bases, rmse, .. } = outline.report;
+                also = format!("; the document as mixtures of {bases} materials (d = {rmse:.3})");
+                (&outline.factored, "")
+            }
+        };
         let shown = Shown {
             name: &document.name,
             space: document.materials().space(),
             library: &settings.library,
             dots: std::borrow::Cow::Borrowed(&halftoned.dots),
-            target: document.as_factored().zip(self.mixture.as_ref()),
-            replay: &self.replay,
-            also: String::new(),
+            target: Some((target, &self.mixture)),
+            replay,
+            also,
         };
         Ok(shown.page(&View::default(), observer)?.html)
     }
 
     /// The page that joins all.
-    pub(crate) fn report_page(&self, plan: &press::job::plan::Plan) -> Result<String, Error> {
+    pub(crate) fn report_page(&self, plan: &Plan) -> Result<String, Error> {
         let Print { document, halftoned, contrasts, .. } = &self.print;
         report::page(&report::Subject {
             plan,

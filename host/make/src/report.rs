@@ -20,6 +20,9 @@ use crate::Error;
 /// Materials whose curves are drawn: those that stand for most of the document.
 const DRAWN: usize = 8;
 
+/// What figures mean that have no unit.
+const UNIT: &str = "A difference of 0.01, in d or light, is barely visible, one of 0.05 obvious.";
+
 /// The finest pattern that an eye resolves, in cycles a degree.
 const RESOLVED: f64 = 30.0;
 
@@ -90,13 +93,14 @@ fn write(subject: &Subject, plots: &[(usize, String)], page: &mut String) -> fmt
         plan.passes.len(),
         fidelity.mean
     )?;
+    page.push_str(&html::modelled(plan.modelled_in_words().as_deref()));
     if let Some(contrasts) = subject.contrasts {
         writeln!(page, "<p>Two pictures: {}.</p>", escape(&contrasts.to_string()))?;
     }
     write!(
         page,
         "<h2>The sheet</h2>\n<p>Document above, print below, under four lights, and the dots under a lens. On <a href=\"sheet.html\">the sheet's own page</a> \
-         the light follows the hand; <code>foilpress preview</code> puts the document beside it.</p>\n\
+         the light follows the hand.</p>\n\
          <a href=\"sheet.png\"><img alt=\"document and print under four lights\" src=\"sheet.png\"></a>\n\
          <h2>Materials</h2>\n<p>Before and after they were fitted to the inks.</p>\n\
          <a href=\"materials.png\"><img alt=\"materials before and after mapping, as balls\" src=\"materials.png\"></a>\n"
@@ -128,7 +132,7 @@ fn drawn(materials: &[MaterialReport]) -> Vec<usize> {
 
 /// Curves of the materials against what is printable.
 fn write_gamut(subject: &Subject, plots: &[(usize, String)], page: &mut String) -> fmt::Result {
-    let (kind, wide) = (subject.kind, html::wide("mixtures"));
+    let kind = subject.kind;
     let some = if plots.len() < subject.materials.len() {
         format!(" Drawn are the {} that stand for most of the document.", plots.len())
     } else {
@@ -136,14 +140,17 @@ fn write_gamut(subject: &Subject, plots: &[(usize, String)], page: &mut String) 
     };
     write!(
         page,
-        "<h2>Gamut</h2>\n<p>Lines: the {kind}. Dashed: the best mixture of the stacks in use.{some}</p>\n{wide}<table>\
-         <tr><th class=\"n\">{kind}<th class=\"n\">share<th class=\"n\">d<th class=\"n\">light<th>gloss at 20, 60, 85&deg;<th>printed<th>mixture"
+        "<h2>Gamut</h2>\n<p>Lines: the {kind}. Dashed: the best mixture of the stacks in use.{some} {UNIT}</p>\n\
+         <table class=\"cards\"><tr><th class=\"n\">{kind}<th class=\"n\">share<th class=\"n\">d<th class=\"n\">light\
+         <th>gloss at 20, 60, 85&deg;, GU<th>printed, GU<th>mixture"
     )?;
     for (number, (material, gloss)) in subject.materials.iter().zip(subject.gloss).enumerate() {
         write!(
             page,
-            "<tr><td class=\"n\">{number}<td class=\"n\">{:.1} %<td class=\"n\">{:.3}<td class=\"n\">{:.3}<td>{}{}<td>{}\
-             <td class=\"words\">{}",
+            "<tr><td class=\"n\" data-name=\"{kind}\">{number}<td class=\"n\" data-name=\"share\">{:.1} %\
+             <td class=\"n\" data-name=\"d\">{:.3}<td class=\"n\" data-name=\"light\">{:.3}\
+             <td data-name=\"gloss at 20, 60, 85&deg;, GU\">{}{}<td data-name=\"printed, GU\">{}\
+             <td class=\"words\" data-name=\"mixture\">{}",
             100.0 * material.share,
             material.unscaled_distance,
             material.light,
@@ -153,7 +160,7 @@ fn write_gamut(subject: &Subject, plots: &[(usize, String)], page: &mut String) 
             escape(&mix_in_words(&material.weights))
         )?;
     }
-    writeln!(page, "</table></div>\n<div class=\"many\">")?;
+    writeln!(page, "</table>\n<div class=\"many\">")?;
     for (number, svg) in plots {
         writeln!(page, "{}", html::drawing(&format!("curves of {kind} {number}"), svg))?;
     }
@@ -166,15 +173,15 @@ fn write_errors(
     doubt: Option<DistanceUncertainty>,
     page: &mut String,
 ) -> fmt::Result {
-    let row = |name: &str, value: f64| format!("<tr><th>{name}<td class=\"n\">{value:.3}");
+    let row = |name: &str, value: f64| format!("<tr><th>{name}<td class=\"n\">d = {value:.3}");
     writeln!(
         page,
-        "<h2>Errors</h2>\n<p>Differences between print and document, seen from {eye} m.</p>\n<table>{}{}{}{}{}</table>",
-        row("average d", fidelity.mean),
-        row("root mean square d", fidelity.rmse),
+        "<h2>Errors</h2>\n<p>Differences between print and document, seen from {eye} m. {UNIT}</p>\n<table>{}{}{}{}{}</table>",
+        row("average", fidelity.mean),
+        row("root mean square", fidelity.rmse),
         row("95 % of places below", fidelity.p95),
-        row("largest d", fidelity.max),
-        row("light, root mean square", fidelity.light_rmse)
+        row("largest", fidelity.max),
+        format_args!("<tr><th>light, root mean square<td class=\"n\">{:.3}", fidelity.light_rmse)
     )?;
     doubt.map_or(Ok(()), |doubt| writeln!(page, "<p>{doubt}.</p>"))
 }
@@ -197,16 +204,16 @@ fn write_halftone(subject: &Subject, page: &mut String) -> fmt::Result {
         }
         None => writeln!(page, "<p>The print is too small or too even for a spectrum.</p>")?,
     }
-    let wide = html::wide("tones");
     write!(
         page,
-        "{wide}<table><tr><th>stack<th class=\"n\">asked<th class=\"n\">printed<th class=\"n\">worst window\
+        "<table class=\"cards\"><tr><th>stack<th class=\"n\">asked<th class=\"n\">printed<th class=\"n\">worst window\
          <th class=\"n\">smallest cluster"
     )?;
     for tone in subject.tones {
         write!(
             page,
-            "<tr><td>{}<td class=\"n\">{:.2} %<td class=\"n\">{:.2} %<td class=\"n\">{:.2} %<td class=\"n\">{} dots",
+            "<tr><td data-name=\"stack\">{}<td class=\"n\" data-name=\"asked\">{:.2} %<td class=\"n\" data-name=\"printed\">{:.2} %\
+             <td class=\"n\" data-name=\"worst window\">{:.2} %<td class=\"n\" data-name=\"smallest cluster\">{} dots",
             tone.stack,
             100.0 * tone.asked,
             100.0 * tone.printed,
@@ -214,7 +221,7 @@ fn write_halftone(subject: &Subject, page: &mut String) -> fmt::Result {
             tone.smallest_cluster
         )?;
     }
-    writeln!(page, "</table></div>")
+    writeln!(page, "</table>")
 }
 
 /// The spectrum as a drawing of 720 x 260, with the frequency an eye at this distance resolves.

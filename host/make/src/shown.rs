@@ -9,13 +9,14 @@ use std::borrow::Cow;
 use appearance::brdf::{Space, Table, reflectances};
 use appearance::factor::Factored;
 use appearance::gamut::InkMix;
+use appearance::materials::resolution;
 use inks::Library;
 use observe::Observer;
 use press::layout::Mm;
 use press::preview::{Probe, Radiance, Source, ToneCurve, mix_in_words, picture};
 use sheet::{Area, DotMap};
-use view::page::{Subject, Target, page};
-use view::{Lit, Renderer, proportions};
+use view::page::{LONGEST, Subject, Target, page};
+use view::{Lit, Renderer, fit, proportions};
 
 use crate::Error;
 use crate::view::{Show, View};
@@ -38,7 +39,7 @@ pub struct Shown<'a> {
     pub dots: Cow<'a, DotMap>,
     /// The document and its mixture of inks, if there is more than dots.
     pub target: Option<(&'a Factored, &'a Mixture)>,
-    /// The commands that replay edits of the document, one a line.
+    /// The commands that replay edits of the document, one a line; empty if its bases are not to be edited.
     pub replay: &'a str,
     /// What else to say of it: what a worn printer made of the dots.
     pub also: String,
@@ -53,14 +54,24 @@ pub struct Mixture {
 }
 
 impl Mixture {
-    /// That of a mapping.
-    #[must_use]
-    pub fn of(mix: &InkMix, library: &Library, space: &Space) -> Mixture {
+    /// That of a mapping, no finer than a page shows it.
+    ///
+    /// # Errors
+    /// Never for a mix that is valid.
+    pub fn of(mix: InkMix, library: &Library, space: &Space) -> Result<Mixture, Error> {
         let words = |row: &Vec<u16>| {
             let parts = mix.stacks.iter().cloned().zip(row.iter().map(|&share| f64::from(share)));
             mix_in_words(&parts.filter(|(_, share)| *share > 0.0).collect::<Vec<_>>())
         };
-        Mixture { mapped: view::mapped(mix, library, space), words: mix.matrix.iter().map(words).collect() }
+        let words = mix.matrix.iter().map(words).collect();
+        let mapped = view::mapped(mix, library, space);
+        let pixels = (mapped.maps.width(), mapped.maps.height());
+        let cells = resolution(pixels, fit(pixels, LONGEST));
+        let mapped = match cells {
+            Some(cells) => mapped.reduced(cells)?,
+            None => mapped,
+        };
+        Ok(Mixture { mapped, words })
     }
 }
 

@@ -30,6 +30,14 @@ pub fn wide(what: &str) -> String {
     format!("<div class=\"wide\" role=\"region\" tabindex=\"0\" aria-label=\"{}\">", escape(what))
 }
 
+/// A badge that says that curves of inks are modelled, and what that means, where it is so.
+pub fn modelled(words: Option<&str>) -> String {
+    let badge = |words| {
+        format!("<p><span class=\"badge\">modelled inks</span> <small>{}.</small></p>\n", escape(words))
+    };
+    words.map(badge).unwrap_or_default()
+}
+
 /// A drawing in SVG, which is one picture to who cannot see it; `what` says what it shows.
 pub fn drawing(what: &str, svg: &str) -> String {
     format!("<figure role=\"img\" aria-label=\"{}\">{svg}</figure>", escape(what))

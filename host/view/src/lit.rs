@@ -76,7 +76,7 @@ pub fn fit((width, height): (usize, usize), longest: usize) -> (usize, usize) {
 }
 
 /// The bases of a mapped document are mixtures of stacks.
-pub fn mapped(mix: &InkMix, library: &Library, space: &appearance::brdf::Space) -> Factored {
+pub fn mapped(mix: InkMix, library: &Library, space: &appearance::brdf::Space) -> Factored {
     let stacks = reflectances(&mix.stacks, library, space);
     let mut bases = Table::new(space.columns());
     for shares in &mix.matrix {
@@ -87,7 +87,7 @@ pub fn mapped(mix: &InkMix, library: &Library, space: &appearance::brdf::Space) 
         }
         bases.push(&row);
     }
-    Factored { space: space.clone(), bases, maps: mix.maps.clone() }
+    Factored { space: space.clone(), bases, maps: mix.maps }
 }
 
 impl Lit {

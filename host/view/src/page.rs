@@ -105,7 +105,7 @@ pub struct Target<'a> {
     pub mapped: &'a Factored,
     /// What each basis of `mapped` is mixed of.
     pub mixtures: &'a [String],
-    /// The commands that replay `steps.toml` on the document, one a line.
+    /// The commands that replay `steps.toml` on the document, one a line; empty if its bases are not to be edited.
     pub replay: &'a str,
 }
 
@@ -165,7 +165,7 @@ pub fn page(subject: &Subject, observer: &dyn Observer) -> Result<String, ViewEr
         "name": subject.name, "about": subject.about, "size": subject.size, "start": subject.start,
         "white": ToneCurve::PAPER.exposure, "steps": STEPS,
         "metric": { "angles": space.angles(), "radiance": every_third(space.radiance()), "weight": every_third(space.weight()) },
-        "edits": target.map(edits),
+        "edits": target.filter(|target| !target.replay.is_empty()).map(edits),
         "document": document, "mapped": mapped, "printed": printed, "difference": difference,
         "probe": { "width": probe.width(), "height": probe.height(), "texels": packed(&texels)? },
     });

@@ -85,9 +85,30 @@ pub fn factor(
     settings: &FactorSettings,
     observer: &dyn Observer,
 ) -> Result<Factoring, FactorError> {
+    from_sample(document, settings, |sample| sample, observer)
+}
+
+/// The same, with bases learnt from a few thousand materials, for pictures.
+///
+/// # Errors
+/// Those of [`factor`].
+pub fn outline(
+    document: &dyn Materials,
+    settings: &FactorSettings,
+    observer: &dyn Observer,
+) -> Result<Factoring, FactorError> {
+    from_sample(document, settings, |sample| sample.thinned(grow::MATERIALS), observer)
+}
+
+fn from_sample(
+    document: &dyn Materials,
+    settings: &FactorSettings,
+    chosen: impl FnOnce(Sample) -> Sample,
+    observer: &dyn Observer,
+) -> Result<Factoring, FactorError> {
     check_size(document)?;
     settings.check()?;
-    let sample = Sample::draw(document, settings.seed)?;
+    let sample = chosen(Sample::draw(document, settings.seed)?);
     let Learnt { pca, bases, method } = learn(&sample, settings, observer);
     let columns = &sample.columns;
     let excursion = hull::excursions(&sample, &pca, &bases);

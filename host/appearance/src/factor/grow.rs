@@ -23,7 +23,7 @@ const GAIN: f64 = 0.05;
 /// The most bases that are chosen automatically: as many as the paper used at most.
 pub(super) const MOST: usize = 15;
 /// Number of materials that the number of bases is chosen by.
-const MATERIALS: usize = 4000;
+pub(super) const MATERIALS: usize = 4000;
 const TRIES: usize = 4;
 const SWEEPS: usize = 6;
 

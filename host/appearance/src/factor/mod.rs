@@ -29,7 +29,7 @@ mod tests;
 mod weigh;
 
 pub use error::FactorError;
-pub use factoring::{FactorReport, Factoring, factor};
+pub use factoring::{FactorReport, Factoring, factor, outline};
 pub use settings::{FactorSettings, MOST_BASES, Method};
 
 pub use crate::materials::Factored;

@@ -73,11 +73,15 @@ impl Shine {
             return Ok((None, Vec::new()));
         }
         let (mut times, mut said) = (vec![1.0; things.rows.len()], Vec::<(String, String)>::new());
-        for (&i, Judged { times: found, plain, printed, .. }) in sharp.iter().zip(judged) {
+        for (&i, Judged { times: found, gains, plain, printed }) in sharp.iter().zip(judged) {
             times[i] = found;
             let target = things.rows.row(i);
             let name = words(space, target);
-            if found > 1.0 && said.len() < SAID && said.iter().all(|(other, _)| *other != name) {
+            if (gains || asked)
+                && found > 1.0
+                && said.len() < SAID
+                && said.iter().all(|(other, _)| *other != name)
+            {
                 let light = |row: &[f64]| luminance(space.albedo(row)) / luminance(space.albedo(target));
                 let sentence = format!(
                     "{name}: no ink is as sharp; printed as {} ({:.2} of the light) and not as {} ({:.2})",

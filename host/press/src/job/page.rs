@@ -66,6 +66,7 @@ fn write(plan: &Plan, sheet: &str, passes: &[String], page: &mut String) -> std:
         ribbon::duration(plan.seconds_estimated),
         Plan::TIME_NOTE
     )?;
+    page.push_str(&html::modelled(plan.modelled_in_words().as_deref()));
     write_cartridges(plan, page)?;
     write_passes(plan, passes, page)?;
     write_checks(plan, page)
@@ -75,9 +76,8 @@ fn write(plan: &Plan, sheet: &str, passes: &[String], page: &mut String) -> std:
 fn write_cartridges(plan: &Plan, page: &mut String) -> std::fmt::Result {
     writeln!(
         page,
-        "<h2>Load</h2>\n{}<table><tr><td></td><th>Cartridge</th><th>Part</th><th class=\"n\">Barcode</th>\
-         <th class=\"n\">From pass</th><th class=\"n\">Ribbon*</th></tr>",
-        html::wide("cartridges")
+        "<h2>Load</h2>\n<table class=\"cards\"><tr><td></td><th>Cartridge</th><th>Part</th><th class=\"n\">Barcode</th>\
+         <th class=\"n\">From pass</th><th class=\"n\">Ribbon*</th></tr>"
     )?;
     let (now, later) = plan.loaded();
     for (place, cartridge) in now.iter().chain(later).enumerate() {
@@ -89,8 +89,9 @@ fn write_cartridges(plan: &Plan, page: &mut String) -> std::fmt::Result {
         }
         writeln!(
             page,
-            "<tr><td><span class=\"box\"></span></td><td>{}</td><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
-             <td class=\"n\">{}</td></tr>",
+            "<tr><td><span class=\"box\"></span></td><td data-name=\"Cartridge\">{}</td><td data-name=\"Part\">{}</td>\
+             <td class=\"n\" data-name=\"Barcode\">{}</td><td class=\"n\" data-name=\"From pass\">{}</td>\
+             <td class=\"n\" data-name=\"Ribbon*\">{}</td></tr>",
             escape(&cartridge.sold_as),
             cartridge.part,
             cartridge.barcode,
@@ -98,7 +99,7 @@ fn write_cartridges(plan: &Plan, page: &mut String) -> std::fmt::Result {
             ribbon::length(cartridge.ribbon_mm_estimated)
         )?;
     }
-    writeln!(page, "</table></div>")?;
+    writeln!(page, "</table>")?;
     if !plan.changes.is_empty() {
         writeln!(page, "<p>The printer would stop in the middle of the sheet:</p>\n<ul>")?;
         for change in &plan.changes {
@@ -118,15 +119,14 @@ fn write_passes(plan: &Plan, pictures: &[String], page: &mut String) -> std::fmt
     writeln!(
         page,
         "<p><small>If a cartridge is missing, the printer pauses before that pass and continues once it is \
-         loaded.</small></p>\n<h2>Passes</h2>\n{}<table><tr><th class=\"n\">#</th><th>Ink</th><th class=\"n\">Dots</th>\
-         <th class=\"n\">Cover</th><th class=\"n\">Ribbon*</th></tr>",
-        html::wide("passes")
+         loaded.</small></p>\n<h2>Passes</h2>\n<table class=\"cards\"><tr><th class=\"n\">#</th><th>Ink</th>\
+         <th class=\"n\">Dots</th><th class=\"n\">Cover</th><th class=\"n\">Ribbon*</th></tr>"
     )?;
     for pass in &plan.passes {
         writeln!(
             page,
-            "<tr><td class=\"n\">{}</td><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{:.1} %</td><td class=\"n\">{}</td>\
-             </tr>",
+            "<tr><td class=\"n\" data-name=\"Pass\">{}</td><td data-name=\"Ink\">{}</td><td class=\"n\" data-name=\"Dots\">{}</td>\
+             <td class=\"n\" data-name=\"Cover\">{:.1} %</td><td class=\"n\" data-name=\"Ribbon*\">{}</td></tr>",
             pass.number,
             pass.ink,
             grouped(pass.dots),
@@ -134,7 +134,7 @@ fn write_passes(plan: &Plan, pictures: &[String], page: &mut String) -> std::fmt
             ribbon::length(pass.estimate.ribbon_mm)
         )?;
     }
-    writeln!(page, "</table></div>\n<p><small>* {}.</small></p>", Plan::RIBBON_NOTE)?;
+    writeln!(page, "</table>\n<p><small>* {}.</small></p>", Plan::RIBBON_NOTE)?;
     for cost in plan.costs() {
         writeln!(page, "<p>Cost: {}.</p>", escape(&cost))?;
     }
@@ -164,10 +164,10 @@ fn write_checks(plan: &Plan, page: &mut String) -> std::fmt::Result {
         }
         writeln!(page, "</ul>")?;
     }
-    if !plan.notes.is_empty() {
-        writeln!(page, "<h2>From reading the files</h2>\n<ul>")?;
-        for note in &plan.notes {
-            writeln!(page, "<li>{}</li>", escape(note))?;
+    for (heading, sentences) in plan.said() {
+        writeln!(page, "<h2>{heading}</h2>\n<ul>")?;
+        for sentence in sentences {
+            writeln!(page, "<li>{}</li>", escape(sentence))?;
         }
         writeln!(page, "</ul>")?;
     }

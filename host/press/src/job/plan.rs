@@ -71,6 +71,8 @@ pub struct Plan {
     pub checks: Vec<Check>,
     /// What the readers of the document or art had to assume, in sentences.
     pub notes: Vec<String>,
+    /// How the print will look, in sentences.
+    pub look: Vec<String>,
     /// What would improve the print.
     pub suggestions: Vec<Suggestion>,
 }
@@ -146,6 +148,8 @@ pub struct Share {
     pub dots: u64,
     /// Dots as a share of the copies'.
     pub share: f64,
+    /// Whether its curve is modelled, and not measured.
+    pub modelled: bool,
 }
 
 /// What a plan is made from.
@@ -231,6 +235,7 @@ impl Plan {
             stacks: shares(sheet, laid, library),
             checks: checks(subject),
             notes: Vec::new(),
+            look: Vec::new(),
             suggestions: Vec::new(),
         }
     }
@@ -337,6 +342,7 @@ fn shares(sheet: &Sheet, laid: &Laid, library: &Library) -> Vec<Share> {
             colour: format!("#{r:02x}{g:02x}{b:02x}"),
             dots,
             share: dots as f64 / area as f64,
+            modelled: !library.modelled([stack]).is_empty(),
         })
         .filter(|stack| stack.dots > 0)
         .collect();
@@ -408,9 +414,31 @@ impl Plan {
     /// How the ribbon was estimated.
     pub const RIBBON_NOTE: &'static str = "an estimate, rather low: in each band of 10 mm the ribbon runs from the first dot to the last, however few there are";
 
+    /// The stacks in use whose curves are modelled.
+    pub fn modelled(&self) -> Vec<&str> {
+        self.stacks.iter().filter(|stack| stack.modelled).map(|stack| &*stack.stack).collect()
+    }
+
+    /// That curves are modelled, in a sentence after the words `modelled inks`.
+    pub fn modelled_in_words(&self) -> Option<String> {
+        let modelled = self.modelled();
+        let which = match modelled.len() {
+            0 => return None,
+            all if all == self.stacks.len() => "these stacks".into(),
+            _ => modelled.join(", "),
+        };
+        Some(format!("no curve of {which} was measured, so pictures and differences are estimates"))
+    }
+
     /// Ribbon of all passes in millimetres, an estimate.
     pub fn ribbon_mm(&self) -> f64 {
         self.passes.iter().map(|pass| pass.estimate.ribbon_mm).sum()
+    }
+
+    /// What the readers had to assume, and how the print will look, under headings.
+    pub(super) fn said(&self) -> impl Iterator<Item = (&'static str, &Vec<String>)> {
+        let all = [("From reading the files", &self.notes), ("How it will look", &self.look)];
+        all.into_iter().filter(|(_, sentences)| !sentences.is_empty())
     }
 
     /// The cartridges to load before the first pass, and those for which the printer has no place then.
@@ -490,6 +518,9 @@ impl Plan {
             let share: f64 = rest.iter().map(|stack| stack.share).sum();
             writeln!(f, "    {:>5.1} %  {} other{}", 100.0 * share, rest.len(), plural(rest.len()))?;
         }
+        if let Some(words) = self.modelled_in_words() {
+            writeln!(f, "Modelled inks: {words}.")?;
+        }
         Ok(())
     }
 }
@@ -532,10 +563,10 @@ impl fmt::Display for Plan {
                 writeln!(f, "    {check}")?;
             }
         }
-        if !self.notes.is_empty() {
-            writeln!(f, "\nFrom reading the files:")?;
-            for note in &self.notes {
-                writeln!(f, "    {}", visible_line(note))?;
+        for (heading, sentences) in self.said() {
+            writeln!(f, "\n{heading}:")?;
+            for sentence in sentences {
+                writeln!(f, "    {}", visible_line(sentence))?;
             }
         }
         if !self.suggestions.is_empty() {

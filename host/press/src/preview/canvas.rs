@@ -21,6 +21,9 @@ pub(super) const INK: [u8; 3] = [232, 232, 232];
 /// Colour of explanatory text.
 pub(super) const FAINT: [u8; 3] = [168, 168, 168];
 
+/// Ground of the badge.
+const BADGE: [u8; 3] = [240, 178, 104];
+
 /// Width of a page on a telephone, in pixels.
 const TELEPHONE: usize = 390;
 
@@ -67,6 +70,18 @@ impl Letters {
     }
 }
 
+/// What stands above a picture.
+#[derive(Clone, Copy, Debug)]
+pub struct Heading<'a> {
+    /// Its title.
+    pub title: &'a str,
+    /// Whether curves of its inks are modelled, which a badge says.
+    pub modelled: bool,
+}
+
+/// The badge of pictures whose inks were not measured.
+const MODELLED: &str = "modelled inks";
+
 /// A picture on the neutral background.
 pub(super) struct Canvas {
     image: Pixels<[u8; 3]>,
@@ -95,6 +110,23 @@ impl Canvas {
         let visible: String = text.chars().take((width - x).div_ceil(letters.width())).collect();
         let text = Text::with_baseline(&visible, Point::zero(), style, Baseline::Top);
         let Ok(_) = text.draw(&mut Enlarged { canvas: self, at: (x, y), times: letters.times() });
+    }
+
+    /// Writes the title at the left, and the badge at the right, both this far from the edge.
+    pub fn heading(&mut self, heading: Heading, gap: usize, letters: Letters) {
+        let room = (self.image.size().0 as usize).saturating_sub(2 * gap) / letters.width();
+        let badge = if heading.modelled { MODELLED.len() } else { 0 };
+        self.text(gap, gap, letters, INK, &shortened(heading.title, room.saturating_sub(badge + 2)));
+        if heading.modelled {
+            let left = gap + room.saturating_sub(badge) * letters.width();
+            let (width, height) = (badge * letters.width(), letters.height());
+            for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (left + x, gap + y))) {
+                if let Some(pixel) = self.image.at_mut(x as u32, y as u32) {
+                    *pixel = BADGE;
+                }
+            }
+            self.text(left, gap, letters, GROUND, MODELLED);
+        }
     }
 
     /// Draws radiance over the background with its top left corner at (x, y).

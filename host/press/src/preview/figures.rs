@@ -12,7 +12,7 @@ use appearance::factor::Factored;
 use appearance::weights::ONE;
 use observe::Observer;
 
-use super::canvas::{Canvas, FAINT, INK, Letters, shortened};
+use super::canvas::{Canvas, FAINT, Heading, Letters, shortened};
 use super::error::PreviewError;
 use super::flat::Light;
 use super::probe::Probe;
@@ -75,7 +75,7 @@ pub fn weights_picture(
     let head = GAP + Letters::Title.height() + GAP;
     let card = line + SIDE + GAP / 2 + height + GAP;
     let mut canvas = Canvas::new(GAP + across * (SIDE + GAP), head + bases.div_ceil(across) * card)?;
-    canvas.text(GAP, GAP, Letters::Title, INK, name);
+    canvas.heading(Heading { title: name, modelled: false }, GAP, Letters::Title);
     for (k, (ball, share)) in balls.iter().zip(factored.shares()).enumerate() {
         let (x, y) = (GAP + k % across * (SIDE + GAP), head + k / across * card);
         canvas.text(x, y, Letters::Plain, FAINT, &format!("basis {k}, {:.1} %", 100.0 * share));
@@ -95,7 +95,7 @@ pub fn weights_picture(
 /// # Errors
 /// A space without half angles, or a picture that would be too large.
 pub fn balls_picture(
-    title: &str,
+    heading: Heading,
     space: &Space,
     columns: &[(&str, Table)],
     probe: &Probe,
@@ -106,7 +106,7 @@ pub fn balls_picture(
     let head = GAP + Letters::Title.height() + GAP;
     let mut canvas =
         Canvas::new(GAP + columns.len().max(1) * (SIDE + GAP), head + line + rows.max(1) * (SIDE + GAP))?;
-    canvas.text(GAP, GAP, Letters::Title, INK, title);
+    canvas.heading(heading, GAP, Letters::Title);
     for (i, (name, rows)) in columns.iter().enumerate() {
         let x = GAP + i * (SIDE + GAP);
         canvas.text(x, head, Letters::Plain, FAINT, &shortened(name, SIDE / Letters::Plain.width()));

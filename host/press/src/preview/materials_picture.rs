@@ -11,7 +11,7 @@ use readers::Pixels;
 use appearance::brdf::{Space, Table};
 use observe::Observer;
 
-use super::canvas::{Canvas, FAINT, INK, Letters, shortened};
+use super::canvas::{Canvas, FAINT, Heading, INK, Letters, shortened};
 use super::error::{PreviewError, check_size};
 use super::probe::Probe;
 use super::radiance::Radiance;
@@ -39,7 +39,7 @@ const PROBE_ROWS: usize = 128;
 
 const GAP: usize = 20;
 
-/// Lays out `swatches` as cards with balls of `ball` pixels across.
+/// Lays out `swatches` as cards with balls of `ball` pixels across; a badge says if curves are `modelled`.
 ///
 /// # Errors
 /// A row of another space, a space without half angles, or a picture that would be too large.
@@ -48,6 +48,7 @@ pub fn materials_picture(
     swatches: &[Swatch],
     probe: &Probe,
     ball: usize,
+    modelled: bool,
     observer: &dyn Observer,
 ) -> Result<Pixels<[u8; 3]>, PreviewError> {
     check_size(ball, ball)?;
@@ -81,7 +82,8 @@ pub fn materials_picture(
     let down = swatches.len().div_ceil(across);
     let step = (card.0 + 2 * GAP, card.1 + GAP);
     let mut canvas = Canvas::new(2 * GAP + across * step.0 - GAP, head + down.max(1) * step.1 + GAP / 2)?;
-    canvas.text(GAP, GAP, Letters::Title, INK, "Materials before and after mapping");
+    let title = "Materials before and after mapping";
+    canvas.heading(Heading { title, modelled }, GAP, Letters::Title);
     for (i, swatch) in swatches.iter().enumerate() {
         let (x, y) = (GAP + i % across * step.0, head + i / across * step.1);
         let d = space.distance(swatch.target, swatch.printed);
@@ -182,7 +184,7 @@ mod tests {
         let swatch =
             Swatch { name: "basis 1".into(), target: &row, printed: &row, mix: vec![(stack("MS"), 1.0)] };
         let ball = 40;
-        let picture = materials_picture(&space, &[swatch], &Probe::studio(16), ball, &Silent).unwrap();
+        let picture = materials_picture(&space, &[swatch], &Probe::studio(16), ball, false, &Silent).unwrap();
         let shift = (2 * ball + 6 + GAP) as u32;
         // The balls' lines: below the title and the card's two lines of words.
         let top = (GAP + Letters::Title.height() + GAP / 2 + 2 * (Letters::Plain.height() + 4)) as u32;
@@ -202,7 +204,8 @@ mod tests {
         let space = Space::half_angle(4);
         let good = vec![0.1; 12];
         let swatch = Swatch { name: String::new(), target: &good, printed: &good[..9], mix: Vec::new() };
-        let error = materials_picture(&space, &[swatch], &Probe::constant(1.0), 8, &Silent).unwrap_err();
+        let error =
+            materials_picture(&space, &[swatch], &Probe::constant(1.0), 8, false, &Silent).unwrap_err();
         assert!(matches!(error, PreviewError::Shape { expected: 12, found: 9, .. }), "{error}");
     }
 }

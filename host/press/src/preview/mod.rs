@@ -30,7 +30,7 @@ pub mod sphere;
 mod tone;
 mod wear;
 
-pub use canvas::picture;
+pub use canvas::{Heading, picture};
 pub use contrasts::{Contrasts, contrasts};
 pub use error::{LONGEST_SIDE, PreviewError};
 pub use fidelity::{EYE, FidelityReport, fidelity, spot_mm};

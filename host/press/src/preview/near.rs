@@ -16,7 +16,7 @@ use observe::Observer;
 use rayon::prelude::*;
 use readers::Pixels;
 
-use super::canvas::{Canvas, INK, Letters, shortened};
+use super::canvas::{Canvas, Heading, Letters};
 use super::error::PreviewError;
 use super::flat::{Curves, DOCUMENT_SAMPLES};
 use super::radiance::Radiance;
@@ -28,7 +28,7 @@ const RINGS: usize = 96;
 const SPOKES: usize = 56;
 
 /// Pixels across the sheet in the picture, and around everything.
-const SIDE: usize = 512;
+const SIDE: usize = 640;
 const GAP: usize = 16;
 
 /// How high the eye is over the sheet: 45 degrees.
@@ -231,28 +231,37 @@ fn seen(board: &Board, elevation: f64, width: usize) -> Radiance {
     Radiance { width: across, height: down, pixels: (0..across * down).map(pixel).collect() }
 }
 
-/// Figure 2: a print, and the board that it mirrors.
+/// The part of a board over the sheet that is shown, so that the sheet fills the picture: as wide as it, and half as high,
+/// but at least two squares.
+fn shown(board: Radiance, sheet: usize) -> Radiance {
+    let (left, squares) = ((board.width - SIDE) / 2, SIDE / 7);
+    let height = (sheet / 2).max(squares).min(board.height);
+    let rows = board.pixels.chunks_exact(board.width).skip(board.height - height);
+    let pixels = rows.flat_map(|row| &row[left..left + SIDE]).copied().collect();
+    Radiance { width: SIDE, height, pixels }
+}
+
+/// Figure 2: a print, and the foot of the board that it mirrors.
 ///
 /// # Errors
 /// Those of [`mirrored`].
 pub fn near_picture(
-    name: &str,
+    heading: Heading,
     source: &Source,
     observer: &dyn Observer,
 ) -> Result<Pixels<[u8; 3]>, PreviewError> {
     let (across, down) = source.size();
     let board = Board::behind(down as f64 / across.max(1) as f64, ELEVATION);
     let sheet = mirrored(source, &board, ELEVATION, SIDE, observer)?;
-    let board_picture = seen(&board, ELEVATION, SIDE);
+    let board_picture = shown(seen(&board, ELEVATION, SIDE), sheet.height);
     // What lies between the far edge of the sheet and the foot of the board.
     let between = (0.02 * ELEVATION.sin() * SIDE as f64).round() as usize;
     let head = GAP + Letters::Title.height() + GAP;
     let foot = head + board_picture.height + between;
     let mut canvas = Canvas::new(board_picture.width + 2 * GAP, foot + sheet.height + GAP)?;
-    let room = board_picture.width / Letters::Title.width();
-    canvas.text(GAP, GAP, Letters::Title, INK, &shortened(name, room));
+    canvas.heading(heading, GAP, Letters::Title);
     canvas.paste(GAP, head, &board_picture, TONE);
-    canvas.paste(GAP + (board_picture.width - SIDE) / 2, foot, &sheet, TONE);
+    canvas.paste(GAP, foot, &sheet, TONE);
     Ok(canvas.finish())
 }
 

@@ -10,7 +10,7 @@ use readers::Pixels;
 use observe::Observer;
 use sheet::{Area, DotMap};
 
-use super::canvas::{Canvas, FAINT, INK, Letters, shortened};
+use super::canvas::{Canvas, FAINT, Heading, INK, Letters, shortened};
 use super::error::{PreviewError, check_size};
 use super::flat::{Light, flat};
 use super::radiance::Radiance;
@@ -19,19 +19,19 @@ use super::tone::ToneCurve;
 
 /// The default lights: above the middle, beside it, and low enough to show only the body colour.
 pub const STANDARD_LIGHTS: [(&str, Light); 4] = [
-    ("light at the eye", Light::Point([0.0, 0.0, 1.3])),
-    ("light at left", Light::Point([-0.3, 0.2, 1.1])),
-    ("light at right", Light::Point([0.3, -0.15, 1.1])),
-    ("raking light", Light::Point([0.0, 2.1, 1.4])),
+    ("light: eye", Light::Point([0.0, 0.0, 1.3])),
+    ("light: left", Light::Point([-0.3, 0.2, 1.1])),
+    ("light: right", Light::Point([0.3, -0.15, 1.1])),
+    ("light: raking", Light::Point([0.0, 2.1, 1.4])),
 ];
 
 /// Far lights at four angles to an eye above: the reflection, two tilts, and the 45 degrees at which
 /// colours are measured.
 pub const TILTS: [(&str, Light); 4] = [
-    ("in the reflection", Light::Far([0.0, 0.0, 1.0])),
-    ("light 15° beside", Light::Far([0.258_819_045, 0.0, 0.965_925_826])),
-    ("light 30° beside", Light::Far([0.5, 0.0, 0.866_025_404])),
-    ("light 45° beside", Light::Far([1.0, 0.0, 1.0])),
+    ("reflection", Light::Far([0.0, 0.0, 1.0])),
+    ("tilted by 15°", Light::Far([0.258_819_045, 0.0, 0.965_925_826])),
+    ("tilted by 30°", Light::Far([0.5, 0.0, 0.866_025_404])),
+    ("tilted by 45°", Light::Far([1.0, 0.0, 1.0])),
 ];
 
 const GAP: usize = 16;
@@ -74,10 +74,10 @@ impl<'a> Panels<'a> {
         let only: Vec<Light> = lights.iter().map(|l| l.1).collect();
         let mut rows = vec![
             ("target", flat(target, &only, width, height, observer)?),
-            ("print, simulated", flat(&print, &only, width, height, observer)?),
+            ("print", flat(&print, &only, width, height, observer)?),
         ];
         if let Some(panels) = close_up(&print, &only, width, height, observer)? {
-            rows.push(("the print's dots", panels));
+            rows.push(("its dots", panels));
         }
         Ok(Panels { lights, width, height, rows, across: ACROSS, one_exposure: false })
     }
@@ -89,11 +89,11 @@ impl<'a> Panels<'a> {
         Panels { across: self.lights.len().max(1), one_exposure: true, ..self }
     }
 
-    /// Lays them out. `title` stands above the picture and `notes` below it, one line each.
+    /// Lays them out, with `notes` below the picture, one line each.
     ///
     /// # Errors
     /// A picture larger than [`LONGEST_SIDE`](super::LONGEST_SIDE).
-    pub fn picture(&self, title: &str, notes: &[String]) -> Result<Pixels<[u8; 3]>, PreviewError> {
+    pub fn picture(&self, heading: Heading, notes: &[String]) -> Result<Pixels<[u8; 3]>, PreviewError> {
         let &Panels { lights, width, height, ref rows, across, one_exposure } = self;
         let target = &rows[0].1;
         let tones: Vec<ToneCurve> = match one_exposure {
@@ -108,7 +108,7 @@ impl<'a> Panels<'a> {
         let foot = notes.len() * line + GAP;
         let mut canvas = Canvas::new(wide, head + groups * group + foot)?;
         let whole = |words: &str| shortened(words, (wide - 2 * GAP) / letters.width());
-        canvas.text(GAP, GAP, letters, INK, &whole(title));
+        canvas.heading(heading, GAP, letters);
         for (i, (light, _)) in lights.iter().enumerate() {
             let (left, top) = (GAP + i % across * (width + GAP), head + i / across * group);
             let within = |words: &str| shortened(words, width / letters.width());
@@ -204,7 +204,7 @@ mod tests {
         let notes = ["a note".to_string()];
         let picture = Panels::lit(&print, &print, &STANDARD_LIGHTS, 60, &Silent)
             .unwrap()
-            .picture("a sheet", &notes)
+            .picture(Heading { title: "a sheet", modelled: true }, &notes)
             .unwrap();
         assert_eq!(picture.size().0 as usize, GAP + 2 * (60 + GAP));
         let line = Letters::Plain.height() + 6;

@@ -141,7 +141,7 @@ impl Args {
         let target = prepared.bases(observer)?;
         let Print { document, settings, halftoned, .. } = prepared;
         let library = settings.library;
-        let mixture = mapped(&halftoned.mapped.mix, &library, &space());
+        let mixture = mapped(halftoned.mapped.mix, &library, &space());
         let sheet = page.sheet.dots().clone();
         Ok(Work { name: document.name, sheet, library, document: Some((target, mixture, area)) })
     }

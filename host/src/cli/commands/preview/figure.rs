@@ -8,10 +8,10 @@ use appearance::document::SAMPLES;
 use appearance::factor::Factored;
 use appearance::gamut::{self, GamutSettings, Gloss, Intent, Mapped, Printable};
 use clap::ValueEnum;
-use inks::Library;
+use inks::{Library, Stack};
 use observe::Observer;
 use press::preview::figures::{SIX_LIGHTS, balls_picture, bases_alone, weights_picture};
-use press::preview::{Panels, Probe, Source, near_picture};
+use press::preview::{Heading, Panels, Probe, Source, near_picture};
 use readers::Pixels;
 use sheet::{Area, DotMap};
 
@@ -49,7 +49,7 @@ pub fn figure(
         let stacks = reflectances(dots.stacks(), &prepared.settings.library, space);
         let print = Source::Print { dots, space, stacks: &stacks, area: Area::whole(dots) };
         let panels = Panels::lit(&prepared.target(), &print, &SIX_LIGHTS, 300, observer)?.in_a_row();
-        return Ok(panels.picture(name, &[])?);
+        return Ok(panels.picture(heading(name, dots.stacks(), &prepared.settings.library), &[])?);
     }
     let bases = prepared.bases(observer)?;
     if figure == Figure::Weights {
@@ -72,7 +72,8 @@ pub fn figure(
         ("clamped", mixed(&clamped, &prepared.settings.library, &alone)),
         ("mapped", mixed(&mapped, &prepared.settings.library, &alone)),
     ];
-    Ok(balls_picture(name, &bases.space, &columns, probe, observer)?)
+    let heading = heading(name, &mapped.mix.stacks, &prepared.settings.library);
+    Ok(balls_picture(heading, &bases.space, &columns, probe, observer)?)
 }
 
 /// What a print mirrors: of a document, a job or a sheet.
@@ -97,7 +98,12 @@ pub fn mirroring(
     let space = Space::half_angle(SAMPLES);
     let stacks = reflectances(dots.stacks(), library, &space);
     let print = Source::Print { dots, space: &space, stacks: &stacks, area };
-    Ok(near_picture(name, &print, observer)?)
+    Ok(near_picture(heading(name, dots.stacks(), library), &print, observer)?)
+}
+
+/// A name above pictures of these stacks.
+fn heading<'a>(title: &'a str, stacks: &[Stack], library: &Library) -> Heading<'a> {
+    Heading { title, modelled: !library.modelled(stacks).is_empty() }
 }
 
 /// The part of a page that has ink; all of one that has none.
@@ -154,7 +160,6 @@ fn stacks(mapped: &Mapped, library: &Library, document: &Factored) -> Table {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use inks::Stack;
 
     #[test]
     fn a_page_is_cut_to_its_ink() {

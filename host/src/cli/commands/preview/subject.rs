@@ -49,11 +49,14 @@ impl PreviewSubject {
         }
         let bases = with_bases.then(|| print.bases(observer)).transpose()?;
         let space = print.document.materials().space().clone();
-        let mix = &print.halftoned.mapped.mix;
-        let target = bases.map(|document| {
-            (document, Mixture::of(mix, &print.settings.library, &space), replay(&print, work))
-        });
+        let replay = bases.as_ref().map(|_| replay(&print, work)).unwrap_or_default();
         let Print { document, settings, halftoned, .. } = print;
+        let target = bases
+            .map(|document| {
+                let mixture = Mixture::of(halftoned.mapped.mix, &settings.library, &space)?;
+                Ok::<_, make::Error>((document, mixture, replay))
+            })
+            .transpose()?;
         let (name, library, dots) = (document.name, settings.library, halftoned.dots);
         Ok(PreviewSubject { name, library, dots, worn: None, space, target })
     }
