@@ -33,6 +33,7 @@ const STYLE: &str = "img{display:block}nav{display:flex;flex-wrap:wrap;gap:.3rem
     border-radius:8px}figure>svg{max-width:min(100%,720px);margin:0 auto}";
 
 /// What the page shows.
+#[derive(Clone, Copy)]
 pub struct Subject<'a> {
     /// The plan.
     pub plan: &'a Plan,
@@ -291,6 +292,7 @@ mod tests {
     use inks::{InkSet, Library, Stack};
     use observe::Silent;
     use press::job::Handling;
+    use press::job::plan::Share;
     use press::layout::Layout;
     use press::pipeline::{Request, draft};
     use protocol::paper::Paper;
@@ -390,6 +392,23 @@ mod tests {
             .split('L')
             .map(|at| at.split_once(' ').unwrap().1.parse::<f64>().unwrap());
         assert!(label + 5.0 < highest.fold(f64::MAX, f64::min), "{label}");
+        // On a phone each cell says what it is.
+        let tables = text.split("class=\"cards\"").skip(1).map(|rest| rest.split_once("</table>").unwrap().0);
+        let cells = tables.map(|table| (table.matches("<td").count(), table.matches("data-name=\"").count()));
+        let cells: Vec<(usize, usize)> = cells.collect();
+        assert!(cells.len() == 2 && cells.iter().all(|(cells, named)| cells == named), "{cells:?}");
+        // Every stack of the built-in library is modelled, until it is measured.
+        let measured = Plan {
+            stacks: plan.stacks.iter().cloned().map(|stack| Share { modelled: false, ..stack }).collect(),
+            ..plan.clone()
+        };
+        let badge = |plan: &Plan| {
+            let page = page(&Subject { plan, ..subject }).unwrap();
+            let text = plan.to_string();
+            assert_eq!(page.contains("modelled inks</span>"), text.contains("Modelled inks: "));
+            (page.contains("modelled inks</span>"), text.contains("no curve of these stacks was measured"))
+        };
+        assert_eq!([badge(&plan), badge(&measured)], [(true, true), (false, false)]);
         let even = page(&Subject { spectrum: None, ..subject }).unwrap();
         assert!(even.contains("too small or too even") && even.matches("<svg").count() == DRAWN);
     }

@@ -37,6 +37,17 @@ fn a_folder_becomes_a_print_with_everything_in_it() {
     let report = fs::read_to_string(bench.path("tile.print/report.json")).expect("a report");
     let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
     assert_eq!(report["job"]["bytes"], fs::metadata(bench.path("tile.print/job.rgl")).unwrap().len());
+    let stacks = report["plan"]["stacks"].as_array().expect("stacks").iter();
+    let stacks: Vec<_> = stacks.map(|stack| stack["stack"].clone()).collect();
+    assert_eq!(
+        report["modelled"],
+        serde_json::Value::Array(stacks),
+        "no ink of the built-in library is measured"
+    );
+    // The document stands beside its print, though it has no bases, and these are not to be edited.
+    let page = fs::read_to_string(bench.path("tile.print/sheet.html")).expect("a page");
+    assert!(page.contains("show=document&with=printed"));
+    assert!(page.contains("\"edits\":null") && !page.contains("\"document\":null"));
     // The same command again replaces its own folder and gives the same job to the byte.
     let job = fs::read(bench.path("tile.print/job.rgl")).expect("a job");
     bench.done("print tile --size 12x8mm --paper postcard --to file:again.rgl");

@@ -379,12 +379,12 @@ fn figures_of_the_paper_are_pictures_of_any_document() {
             .sum()
     };
     assert!(light(2) > light(4) && light(4) > light(5), "{} {} {}", light(2), light(4), light(5));
-    // The board is a fifth wider than the sheet of 512 pixels; a row of it has twelve squares.
+    // The sheet fills the picture with 640 pixels; a row of the board has ten squares.
     bench.done(&format!("preview tile {SMALL} --figure near -o near.png"));
     let picture = image::open(bench.path("near.png")).expect("a picture").into_rgb8();
-    assert_eq!(picture.width(), 2 * 16 + 614);
-    let is_white = |i: u32| picture.get_pixel(16 + 25 + 51 * i, 100).0[1] > 150;
-    assert!((0..11).all(|i| is_white(i) != is_white(i + 1)));
+    assert_eq!(picture.width(), 2 * 16 + 640);
+    let is_white = |i: u32| picture.get_pixel(16 + 32 + 64 * i, 100).0[1] > 150;
+    assert!((0..9).all(|i| is_white(i) != is_white(i + 1)));
     // The ramp of the paper: foil mirrors the squares, metallic ink hardly.
     bench.done("chart ramp silver-foil metallic-silver -q -o ramp --figure ramp.png");
     let picture = image::open(bench.path("ramp.png")).expect("a picture").into_rgb8();
