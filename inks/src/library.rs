@@ -178,7 +178,8 @@ impl Library {
         self.entries.iter().filter(usable).collect()
     }
 
-    /// Those of some stacks whose curves were neither measured nor predicted from what was; the library need not list them.
+    /// Those of some stacks whose curves were neither measured nor predicted from what was. The library need
+    /// not list them.
     pub fn modelled<'a>(&self, stacks: impl IntoIterator<Item = &'a Stack>) -> Vec<&'a Stack> {
         let by_whom = |stack: &Stack| self.entry(stack).map(|entry| &entry.provenance);
         let is_modelled = |stack: &&Stack| matches!(by_whom(stack), None | Some(Provenance::Modelled { .. }));

@@ -39,6 +39,7 @@ mod error;
 pub mod layers;
 pub mod made;
 pub mod options;
+mod outline;
 pub mod print;
 mod report;
 pub mod shown;

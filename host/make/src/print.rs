@@ -9,9 +9,8 @@
 
 use appearance::brdf::reflectances;
 use appearance::document::Document;
-use appearance::factor::{self, FactorReport, FactorSettings, Factored, Factoring};
+use appearance::factor::{FactorReport, FactorSettings, Factored};
 use appearance::gamut::{GamutSettings, InkMix, Printable};
-use appearance::materials::{Reduced, resolution};
 use appearance::srgb::luminance;
 use halftone::metrics::{self, Look, Tone};
 use inks::{InkSet, Library};
@@ -31,19 +30,14 @@ use rayon::prelude::*;
 use readers::Pixels;
 use serde_json::{Value, json};
 use sheet::Area;
-use view::fit;
 
 use crate::options::HALFTONE;
 use crate::shown::{Mixture, Shown};
 use crate::view::View;
-use crate::{Error, PageSettings, report};
+use crate::{Error, PageSettings, outline, report};
 
 /// Bases of a document whose print needs none, so that the picture of it is close.
 const BASES: usize = 12;
-/// Bases of a document that is shown beside its print, and places along its longer side: most pixels of a
-/// leaf are then within .005 of their own look, where .01 is barely visible, in two seconds.
-const FEW: usize = 8;
-const OUTLINE: usize = 512;
 /// Pixels of the longer side of a panel in `sheet.png`.
 const PANEL: usize = 480;
 /// Pixels across a ball in `materials.png`.
@@ -208,22 +202,6 @@ impl Print {
         Ok(document::factored(&self.document, &self.factoring(), observer)?.0.into_owned())
     }
 
-    /// The document as mixtures of a few materials, as the page of the sheet shows it beside the print: found where
-    /// the page has places, in a second or two.
-    fn outline(&self, observer: &dyn Observer) -> Result<Factoring, Error> {
-        let document = self.document.materials();
-        let pixels = (document.width(), document.height());
-        let settings = FactorSettings {
-            bases: Some(FEW),
-            seed: self.settings.dots.factor.seed,
-            ..FactorSettings::default()
-        };
-        Ok(match resolution(pixels, fit(pixels, OUTLINE)) {
-            Some(cells) => factor::outline(&Reduced::new(document, cells), &settings, observer)?,
-            None => factor::outline(document, &settings, observer)?,
-        })
-    }
-
     /// Whether bases were mapped, and not pixels.
     #[must_use]
     pub fn uses_bases(&self) -> bool {
@@ -362,17 +340,17 @@ impl Seen {
     /// The page on which light follows the hand.
     pub(crate) fn light(&self, observer: &dyn Observer) -> Result<String, Error> {
         let Print { document, settings, halftoned, .. } = &self.print;
-        let (outline, also);
+        let (drawn, also);
         let (target, replay) = match document.as_factored() {
             Some(factored) => {
                 also = String::new();
                 (factored, self.replay.as_str())
             }
             None => {
-                outline = self.print.outline(observer)?;
-                let FactorReport { bases, rmse, .. } = outline.report;
+                drawn = outline::of(document.materials(), settings.dots.factor.seed, observer)?;
+                let FactorReport { bases, rmse, .. } = drawn.report;
                 also = format!("; the document as mixtures of {bases} materials (d = {rmse:.3})");
-                (&outline.factored, "")
+                (&drawn.factored, "")
             }
         };
         let shown = Shown {

@@ -213,7 +213,8 @@ fn write_halftone(subject: &Subject, page: &mut String) -> fmt::Result {
     for tone in subject.tones {
         write!(
             page,
-            "<tr><td data-name=\"stack\">{}<td class=\"n\" data-name=\"asked\">{:.2} %<td class=\"n\" data-name=\"printed\">{:.2} %\
+            "<tr><td data-name=\"stack\">{}<td class=\"n\" data-name=\"asked\">{:.2} %\
+             <td class=\"n\" data-name=\"printed\">{:.2} %\
              <td class=\"n\" data-name=\"worst window\">{:.2} %<td class=\"n\" data-name=\"smallest cluster\">{} dots",
             tone.stack,
             100.0 * tone.asked,

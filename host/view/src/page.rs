@@ -105,7 +105,7 @@ pub struct Target<'a> {
     pub mapped: &'a Factored,
     /// What each basis of `mapped` is mixed of.
     pub mixtures: &'a [String],
-    /// The commands that replay `steps.toml` on the document, one a line; empty if its bases are not to be edited.
+    /// The commands that replay `steps.toml` on the document, one a line; empty if bases are not edited.
     pub replay: &'a str,
 }
 

@@ -13,14 +13,14 @@ use super::fitting::basis::Bases;
 use super::fitting::clamp::Clamped;
 use super::fitting::gloss::FEW_MERGED;
 use super::fitting::{basis, blend, clamp, local, spatial_average};
+use super::notes::{in_words, say_gloss, spared_in_words};
 use super::result::assemble;
 use super::result::report::{GamutReport, Judged, Mapped, PixelReport, Worth};
 use super::sample;
 use super::selection::cartridges::{Cartridges, Precision};
 use super::selection::fitted::{Service, Targets};
-use super::selection::{cartridges, stacks};
+use super::selection::{cartridges, sharp, stacks};
 use super::settings::{GamutSettings, Gloss, Intent};
-use super::shine::Shine;
 use super::things::Things;
 use crate::brdf::{Space, Table};
 use crate::materials::{Factored, Materials, words};
@@ -542,7 +542,7 @@ fn shine(
     match () {
         () if !asked && settings.intent != Intent::Auto => Ok(Vec::new()),
         () if settings.light > 0.0 && settings.hue => {
-            let (shine, said) = Shine::find(space, things, all, asked)?;
+            let (shine, said) = sharp::find(space, things, all, asked)?;
             all.shine = shine;
             if asked && all.shine.is_none() {
                 return nothing("no material of this document is sharper than the inks");
@@ -552,16 +552,6 @@ fn shine(
         () if !asked => Ok(Vec::new()),
         () if settings.hue => nothing("the metric of the paper does not weigh light"),
         () => nothing("of two pictures the contrast of both decides"),
-    }
-}
-
-/// Says by how much the gloss of all bases was reduced.
-fn say_gloss(bases: &Bases, observer: &dyn Observer) {
-    if let Some(factor) = bases.gloss_scale {
-        observer.note(&format!(
-            "the gloss of all materials is reduced to {:.0} %, so that the glossiest ones still differ in print",
-            100.0 * factor
-        ));
     }
 }
 
@@ -578,48 +568,6 @@ fn named(space: &Space, rows: &Table, targets: &Targets, services: &[(Ink, Servi
         Worth { ink, material: words(space, rows.row(row)), share, with, without, hue }
     };
     services.iter().map(one).collect()
-}
-
-/// A share in words.
-fn percent(share: f64) -> String {
-    match 100.0 * share {
-        small if small < 0.1 => format!("{small:.2} %"),
-        small if small < 1.0 => format!("{small:.1} %"),
-        large => format!("{large:.0} %"),
-    }
-}
-
-/// Which cartridges were left out because they bring nothing to any material.
-fn spared_in_words(spared: &[Worth]) -> Option<String> {
-    let names: Vec<&str> = spared.iter().map(|spared| spared.ink.name()).collect();
-    let most = spared.iter().map(|spared| spared.without - spared.with).reduce(f64::max)?;
-    Some(format!(
-        "left out, because no material gains by them: {} (at most {:.4}, where 0.01 is barely visible)",
-        names.join(", "),
-        most.max(0.0)
-    ))
-}
-
-/// Which were left out for the number of cartridges, and which material pays.
-fn in_words(given_up: &[Worth], most: usize) -> Option<String> {
-    let each = given_up.iter().map(|Worth { ink, material, share, with, without, hue }| {
-        let share = percent(*share);
-        let hue = if *hue >= 0.005 {
-            format!("; {} of the sheet lose their hue", percent(*hue))
-        } else {
-            String::new()
-        };
-        format!(
-            "{} (the {material}, {share} of the sheet, pays: {with:.3} with it, {without:.3} without{hue})",
-            ink.name()
-        )
-    });
-    let each: Vec<String> = each.collect();
-    let listed = match each.split_last()? {
-        (last, []) => format!("{last} is"),
-        (last, others) => format!("{} and {last} are", others.join(", ")),
-    };
-    Some(format!("{listed} left out to use at most {most} cartridges"))
 }
 
 fn check_stacks(printable: &Printable) -> Result<(), GamutError> {

@@ -4,8 +4,9 @@
 //! bare paper in black, foil in skin. Others with next to no share bring nothing.
 //! Method: a stack is looked at if its share is below [`RARE`] and it is more than [`BRIGHT`] times as
 //! bright as the mixture over some range of half angles ([`EDGES`]), or if its share is below [`LEAST`].
-//! One after another, the smallest share first, each is removed and the rest solved again; the mixture that
-//! is better stays, with grain as an eye sees it ([`Mixer::exactly`](crate::solve::Mixer)).
+//! First all of the latter at once, then one after another, the smallest share first, are removed and the
+//! rest solved again; the mixture that is better stays, with grain as an eye sees it
+//! ([`Mixer::exactly`](crate::solve::Mixer)).
 //! Cost: two or three steps of the solver for each such stack. Limits: greedy.
 
 use crate::brdf::{Space, Table};
@@ -85,18 +86,25 @@ impl Brightness {
     ) -> Result<Fit, MixtureError> {
         let mut kept: Vec<usize> = Vec::new();
         let mut own = None;
-        while let Some(rare) = self.rarest(weights, |k| !kept.contains(&k)) {
+        let mut next: Vec<usize> =
+            (0..weights.len()).filter(|&k| weights[k] > 0.0 && weights[k] < LEAST).collect();
+        if next.len() < 2 {
+            next = self.rarest(weights, |_| true).into_iter().collect();
+        }
+        while !next.is_empty() {
             let mut without = weights.clone();
-            let rest = 1.0 - std::mem::take(&mut without[rare]);
+            next.iter().for_each(|&k| without[k] = 0.0);
+            let rest: f64 = without.iter().sum();
             without.iter_mut().for_each(|w| *w /= rest);
             let other = mixer.polish(hull, target, &mut without, enough)?;
             let before = *own.get_or_insert_with(|| mixer.exactly(hull, target, weights));
             let after = mixer.exactly(hull, target, &without);
             if after <= before {
                 (*weights, fit, own) = (without, other, Some(after));
-            } else {
+            } else if let [rare] = next[..] {
                 kept.push(rare);
             }
+            next = self.rarest(weights, |k| !kept.contains(&k)).into_iter().collect();
         }
         Ok(fit)
     }

@@ -1,107 +1,23 @@
-//! How much light counts for materials that reflect more sharply than any ink.
+//! How much light counts for each pixel of a document that is sharper than the inks.
 //!
-//! Problem: where no ink is as sharp, every mixture misses the highlight, and the metric takes a wide lobe
-//! for as far off as none; smooth silver came out as a black ball.
-//! Method: materials whose peak no stack reaches are fitted with light counting 1 to 4 times ([`TIMES`]),
-//! and the mixture counts whose ball looks most like that of the material under four lights ([`Balls`]).
-//! If one of them gains a fifth by that, it is done for all, so that what is sharper is not darker. A pixel has the mean over all materials of the document, each by the inverse fourth power of its distance
-//! (D. Shepard 1968), so that nothing jumps where one material shades into another.
-//! Cost: five fits for each such material, and a comparison with each material for every pixel, in such
-//! documents alone. Limits: a material is judged by itself.
+//! Problem: its materials are judged one by one ([`super::selection::sharp`]), and nothing may jump where one
+//! shades into another. Method: a target has the mean over all materials, each by the inverse fourth power of
+//! its distance (D. Shepard 1968). Cost: a comparison with each material, in such documents alone. Limits:
+//! distances are those of summaries.
 
-use rayon::prelude::*;
-
-use super::balls::Balls;
-use super::candidates::Candidates;
-use super::things::Things;
-use crate::brdf::Space;
-use crate::materials::words;
-use crate::solve::{Mixer, MixtureError};
-use crate::srgb::luminance;
 use maths::Maths as _;
 
-/// How many times light may count: steps of a root of two, up to where light is all that counts.
-const TIMES: [f64; 5] = [1.0, std::f64::consts::SQRT_2, 2.0, 2.0 * std::f64::consts::SQRT_2, 4.0];
-/// Light counts more where some ball looks so much better, by a fifth, or where that is asked for.
-/// Source: a choice, the same as for blending.
-const HELPS: f64 = 0.8;
-/// Gap in squared distance that decides nothing.
-const ENOUGH: f64 = 1e-8;
-/// The most materials that a sentence is said about.
-const SAID: usize = 3;
-/// Numbers in the summary of a target.
+/// Numbers in the summary of a target. Source: as many as where a fit starts is found by.
 const NUMBERS: usize = 16;
 
-type Summary = [f32; NUMBERS];
+/// A target in a few numbers.
+pub(super) type Summary = [f32; NUMBERS];
 
 /// How many times light counts for each material of a document.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Shine(Vec<(Summary, f64)>);
-
-/// What became of a material.
-struct Judged {
-    times: f64,
-    /// Whether its ball gains enough.
-    gains: bool,
-    /// Its print without that, and with it.
-    plain: Vec<f64>,
-    printed: Vec<f64>,
-}
+pub(super) struct Shine(pub Vec<(Summary, f64)>);
 
 impl Shine {
-    /// Judges the materials of a document, and says what is done. `None` if none gains; `asked` if any gain
-    /// will do.
-    pub fn find(
-        space: &Space,
-        things: &Things,
-        stacks: &Candidates,
-        asked: bool,
-    ) -> Result<(Option<Shine>, Vec<String>), MixtureError> {
-        let peak = |row: &[f64]| luminance([row[0], row[1], row[2]]);
-        let sharpest = stacks.curves.rows().map(peak).fold(0.0, f64::max);
-        let sharp: Vec<usize> =
-            (0..things.rows.len()).filter(|&i| peak(things.rows.row(i)) > sharpest).collect();
-        if sharp.is_empty() {
-            return Ok((None, Vec::new()));
-        }
-        let balls = Balls::new(space);
-        let judge = |mixer: &mut Mixer, &i: &usize| judge(&balls, things.rows.row(i), stacks, mixer);
-        let judged: Result<Vec<Judged>, MixtureError> =
-            sharp.par_iter().map_init(Mixer::new, judge).collect();
-        let judged = judged?;
-        if !asked && !judged.iter().any(|judged| judged.gains) {
-            return Ok((None, Vec::new()));
-        }
-        let (mut times, mut said) = (vec![1.0; things.rows.len()], Vec::<(String, String)>::new());
-        for (&i, Judged { times: found, gains, plain, printed }) in sharp.iter().zip(judged) {
-            times[i] = found;
-            let target = things.rows.row(i);
-            let name = words(space, target);
-            if (gains || asked)
-                && found > 1.0
-                && said.len() < SAID
-                && said.iter().all(|(other, _)| *other != name)
-            {
-                let light = |row: &[f64]| luminance(space.albedo(row)) / luminance(space.albedo(target));
-                let sentence = format!(
-                    "{name}: no ink is as sharp; printed as {} ({:.2} of the light) and not as {} ({:.2})",
-                    words(space, &printed),
-                    light(&printed),
-                    words(space, &plain),
-                    light(&plain),
-                );
-                said.push((name, sentence));
-            }
-        }
-        if said.is_empty() {
-            return Ok((None, Vec::new()));
-        }
-        let rows = things.rows.rows().zip(times);
-        let known = rows.map(|(row, times)| Ok((stacks.free.target(row)?.summary(&stacks.free), times)));
-        let shine = Shine(known.collect::<Result<_, MixtureError>>()?);
-        Ok((Some(shine), said.into_iter().map(|(_, sentence)| sentence).collect()))
-    }
-
     /// How many times light counts for a target.
     pub fn times(&self, summary: &Summary) -> f64 {
         let (mut sum, mut all) = (0.0, 0.0);
@@ -113,41 +29,4 @@ impl Shine {
         }
         sum / all
     }
-}
-
-/// Finds how many times light counts for a material: the least error of [`TIMES`], and between them the vertex of the parabola
-/// through it and its neighbours.
-fn judge(balls: &Balls, row: &[f64], stacks: &Candidates, mixer: &mut Mixer) -> Result<Judged, MixtureError> {
-    let mut tried = Vec::with_capacity(TIMES.len());
-    for times in TIMES {
-        let printed = printed(row, times, stacks, mixer)?;
-        tried.push((balls.apart(row, &printed), printed));
-    }
-    let errors: Vec<f64> = tried.iter().map(|(error, _)| *error).collect();
-    let (plainly, plain) = tried.swap_remove(0);
-    let least = (0..TIMES.len()).min_by(|&a, &b| errors[a].total_cmp(&errors[b])).unwrap_or(0);
-    let off = match errors.get(least.wrapping_sub(1)..least + 2) {
-        Some(&[before, here, after]) => 0.5 * (before - after) / (before - 2.0 * here + after),
-        _ => 0.0,
-    };
-    let times = TIMES[least] * (0.5 * off).exponential2();
-    let printed = printed(row, times, stacks, mixer)?;
-    let gains = balls.apart(row, &printed) <= HELPS * plainly;
-    Ok(Judged { times, gains, plain, printed })
-}
-
-/// The reflectance (1/sr) of the mixture for a material for which light counts so many times.
-fn printed(
-    row: &[f64],
-    times: f64,
-    stacks: &Candidates,
-    mixer: &mut Mixer,
-) -> Result<Vec<f64>, MixtureError> {
-    let (hull, mut weights) = (&stacks.priced, vec![0.0; stacks.len()]);
-    let mut target = hull.target(row)?;
-    target.light = times;
-    mixer.tangent(hull, &target, &mut weights)?;
-    let fit = mixer.refine_beyond(hull, &target, &mut weights, ENOUGH)?;
-    stacks.brightness.settle(mixer, hull, &target, &mut weights, fit, ENOUGH)?;
-    Ok(stacks.reflectance(weights.into_iter()))
 }

@@ -89,7 +89,8 @@ fn write_cartridges(plan: &Plan, page: &mut String) -> std::fmt::Result {
         }
         writeln!(
             page,
-            "<tr><td><span class=\"box\"></span></td><td data-name=\"Cartridge\">{}</td><td data-name=\"Part\">{}</td>\
+            "<tr><td><span class=\"box\"></span></td>\
+             <td data-name=\"Cartridge\">{}</td><td data-name=\"Part\">{}</td>\
              <td class=\"n\" data-name=\"Barcode\">{}</td><td class=\"n\" data-name=\"From pass\">{}</td>\
              <td class=\"n\" data-name=\"Ribbon*\">{}</td></tr>",
             escape(&cartridge.sold_as),
@@ -125,7 +126,8 @@ fn write_passes(plan: &Plan, pictures: &[String], page: &mut String) -> std::fmt
     for pass in &plan.passes {
         writeln!(
             page,
-            "<tr><td class=\"n\" data-name=\"Pass\">{}</td><td data-name=\"Ink\">{}</td><td class=\"n\" data-name=\"Dots\">{}</td>\
+            "<tr><td class=\"n\" data-name=\"Pass\">{}</td><td data-name=\"Ink\">{}</td>\
+             <td class=\"n\" data-name=\"Dots\">{}</td>\
              <td class=\"n\" data-name=\"Cover\">{:.1} %</td><td class=\"n\" data-name=\"Ribbon*\">{}</td></tr>",
             pass.number,
             pass.ink,

@@ -231,7 +231,7 @@ fn seen(board: &Board, elevation: f64, width: usize) -> Radiance {
     Radiance { width: across, height: down, pixels: (0..across * down).map(pixel).collect() }
 }
 
-/// The part of a board over the sheet that is shown, so that the sheet fills the picture: as wide as it, and half as high,
+/// The part of a board that is shown, so that the sheet fills the picture: as wide as it, and half as high,
 /// but at least two squares.
 fn shown(board: Radiance, sheet: usize) -> Radiance {
     let (left, squares) = ((board.width - SIDE) / 2, SIDE / 7);

@@ -6,4 +6,5 @@
 pub(super) mod cartridges;
 pub(super) mod fitted;
 pub(super) mod redundancy;
+pub(super) mod sharp;
 pub(super) mod stacks;
