@@ -7,9 +7,9 @@
 //! [`Intent::Clamp`] maps every pixel by eq. 1; [`Intent::Blend`] changes smoothly from clamping, where the
 //! material is in the gamut, to the mapped bases, where it is far outside; [`Intent::Contrast`] clamps in
 //! the gamut and outside it keeps differences between neighbours. [`Intent::Auto`] clamps unless that
-//! merges materials that differ and blending keeps clearly more of them apart. [`Intent::Shine`] clamps, and
-//! lets light count more for materials that are sharper than the inks, which [`Intent::Auto`] does where balls
-//! of them look clearly better.
+//! merges materials that differ and blending keeps clearly more of them apart. [`Intent::Shine`] clamps,
+//! and lets light count more for materials that are sharper than the inks; [`Intent::Auto`] does so where
+//! their balls look clearly better.
 //! Cost: a millisecond per basis; 7 to 10 microseconds per pixel and core for clamp and blend, three times
 //! that for contrast. Limits: the mixture is exact only for light that does not scatter sideways in the
 //! paper.

@@ -9,7 +9,8 @@ use super::result::report::Worth;
 pub(super) fn say_gloss(bases: &Bases, observer: &dyn Observer) {
     if let Some(factor) = bases.gloss_scale {
         observer.note(&format!(
-            "the gloss of all materials is reduced to {:.0} %, so that the glossiest ones still differ in print",
+            "the gloss of all materials is reduced to {:.0} %, so that the glossiest ones still differ in \
+             print",
             100.0 * factor
         ));
     }
