@@ -22,7 +22,7 @@ use maths::Maths as _;
 
 /// How many times light may count: steps of a root of two, up to where light is all that counts.
 const TIMES: [f64; 5] = [1.0, std::f64::consts::SQRT_2, 2.0, 2.0 * std::f64::consts::SQRT_2, 4.0];
-/// Light counts more where some ball looks so much better, by a fifth, or where that is asked for.
+/// Light counts more if some ball looks so much better, by a fifth, or if the intent asks for it.
 /// Source: a choice, the same as for blending.
 const HELPS: f64 = 0.8;
 /// Gap in squared distance that decides nothing. Source: a hundredth of what is barely visible, squared.
