@@ -89,9 +89,9 @@ for (const colorScheme of ['light', 'dark']) {
     for (const id of links) assert.ok(await page.evaluate((target) => document.getElementById(target) !== null, id), id);
   }));
 
-  test(`the sheet's page shows the print, ${colorScheme}`, () => visit('print/sheet.html', { ...desk, webgl: true, colorScheme }, async (page) => {
+  test(`the sheet's page shows the print beside its document, ${colorScheme}`, () => visit('print/sheet.html', { ...desk, webgl: true, colorScheme }, async (page) => {
     const at = await rested(page);
-    assert.equal(at.get('show'), 'printed');
+    assert.deepEqual([at.get('show'), at.get('with')], ['document', 'printed']);
     const before = await page.locator('#picture').screenshot();
     await page.focus('#picture');
     for (let i = 0; i < 8; i++) await page.keyboard.press('ArrowRight');

@@ -85,7 +85,7 @@ pub const SHOTS: [Shot; 4] = [
         target: [1.0, 1.0, 0.0],
         roll: 1.5,
         lamp: RIGHT,
-        exposure: 0.9,
+        exposure: 1.4,
     },
 ];
 /// The sensor's response to the three channels.

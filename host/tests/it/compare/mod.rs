@@ -231,14 +231,15 @@ fn a_grey_card_is_white_where_the_paper_is_not() {
     for (i, shot) in shots.into_iter().enumerate() {
         let picture = image::open(bench.path("photos").join(shot.name)).unwrap().into_rgb16();
         let truth = Truth::new(&sheet, shot, &picture, &bench.path("tile"));
-        for (name, from) in [("total", &truth.document), ("print", &truth.print)] {
+        // What inks do not reach is most of the total, whatever the paper.
+        for (name, from, off) in [("total", &truth.document, 0.15), ("print", &truth.print, 0.5)] {
             let truth = rms(&truth.photo, from) / size(&truth.document);
             let [card, paper] = [&card, &paper].map(|report| number(&report["photos"][i]["errors"][name]));
             println!(
                 "{} {name}: {card:.4} by the card, {paper:.4} by the paper, truly {truth:.4}",
                 shot.name
             );
-            assert!((card / truth - 1.0).abs() < 0.03 && paper > 1.5 * truth, "{}", shot.name);
+            assert!((card / truth - 1.0).abs() < 0.03 && (paper / truth - 1.0).abs() > off, "{}", shot.name);
         }
     }
     // Without a card in the pictures there is nothing to go by.
