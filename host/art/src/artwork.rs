@@ -13,10 +13,11 @@ use crate::dots::bitplane;
 use crate::dots::edges::Edges;
 use crate::dots::resample;
 use crate::dots::trace;
+use crate::dots::turn;
 use crate::options::Options;
 use crate::read::coverage::{Coverage, Scan};
 use crate::read::names;
-use sheet::Plane;
+use sheet::{Plane, Turn};
 
 /// Least coverage of a dot that is ink.
 const THRESHOLD: u8 = 128;
@@ -122,6 +123,33 @@ impl Artwork {
             white_kept: 0,
             cuts: None,
             notes: Vec::new(),
+        }
+    }
+
+    /// The same art, turned.
+    #[must_use]
+    pub fn turned(self, turn: Turn) -> Artwork {
+        if turn == Turn::None {
+            return self;
+        }
+        let size = (self.width, self.length);
+        let (width, length) = turn.sides(size);
+        let layer = |layer: Layer| {
+            let shape = match layer.shape {
+                Shape::Solid(dots) => Shape::Solid(turn::plane(&dots, turn)),
+                Shape::Tone(tones) => Shape::Tone(turn::samples(tones, 1, size, turn)),
+            };
+            Layer { shape, ..layer }
+        };
+        Artwork {
+            width,
+            length,
+            layers: self.layers.into_iter().map(layer).collect(),
+            colour: self.colour.map(|colour| colour.turned(size, turn)),
+            drawn: turn::plane(&self.drawn, turn),
+            opaque: self.opaque.map(|opaque| turn::plane(&opaque, turn)),
+            cuts: self.cuts.map(|cuts| turn::plane(&cuts, turn)),
+            ..self
         }
     }
 

@@ -29,6 +29,7 @@ use crate::dots::bitplane;
 use crate::dots::pixels::{Pixels, Rows};
 use crate::dots::screen;
 use crate::dots::tones;
+use crate::dots::turn;
 use crate::error::{no_cluster, not_halftoned};
 use crate::read::object_type::{ObjectType, split};
 use appearance::brdf::Space;
@@ -38,7 +39,7 @@ use appearance::wide::wide;
 use halftone::green_noise::Table;
 use halftone::{Method, halftone};
 use observe::{Diagnosis, Observer};
-use sheet::{Plane, pack};
+use sheet::{Plane, Turn, pack};
 
 /// Dots that are looked at together.
 const BLOCK: usize = 32;
@@ -156,6 +157,16 @@ impl Colour {
         let drew = parts.reduce(Drew::default, Drew::and);
         let pixels = Pixels { bytes, each: N, width: size.0 as usize, height: size.1 as usize };
         drew.any.then_some(Colour { drawn: Drawn::Pixels(pixels, drew), overprints: false })
+    }
+
+    /// The same colours, turned; `dots` are those before the turn.
+    pub(crate) fn turned(self, dots: (usize, usize), turn: Turn) -> Colour {
+        let drawn = match self.drawn {
+            Drawn::Black(plane) => Drawn::Black(turn::plane(&plane, turn)),
+            Drawn::Numbered(colours, index) => Drawn::Numbered(colours, turn::samples(index, 1, dots, turn)),
+            Drawn::Pixels(pixels, drew) => Drawn::Pixels(pixels.turned(turn), drew),
+        };
+        Colour { drawn, ..self }
     }
 
     /// What writes the colours of rows of so many dots; `labels` says whether text is a label.

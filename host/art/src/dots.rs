@@ -10,4 +10,5 @@ pub(crate) mod resample;
 pub(crate) mod screen;
 pub(crate) mod tones;
 pub(crate) mod trace;
+pub(crate) mod turn;
 pub(crate) mod white;

@@ -38,6 +38,7 @@ pub use dots::white::White;
 pub use options::{Options, Pages, Room, TOLERANCES};
 pub use read::open::{is_art, open};
 pub use read::page::Page;
+pub use read::seen::{Seen, seen};
 pub use read::svg::DRAWING;
 pub use read::{names, object_type, pdf, process};
 pub use window::Window;

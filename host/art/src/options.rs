@@ -6,7 +6,7 @@ use files::shelf::{Disk, Shelf};
 use inks::InkSet;
 use protocol::ink::Ink;
 
-use sheet::Size;
+use sheet::{Size, Turn};
 
 /// How far a colour may be from that of an ink, in steps of red, green and blue.
 pub const TOLERANCES: std::ops::RangeInclusive<u8> = 0..=60;
@@ -24,6 +24,10 @@ pub struct Options {
     pub colours: Vec<(Ink, [u8; 3])>,
     /// Largest difference of red, green and blue from a reserved colour; `None` for each ink's own tolerance.
     pub tolerance: Option<u8>,
+    /// How many times as large as it says it is printed, if no size is set.
+    pub scale: f64,
+    /// How it is turned before it is printed.
+    pub turn: Turn,
     /// Pages of a PDF, PostScript or TIFF file.
     pub pages: Pages,
     /// Layers that keep their tones, and are halftoned; all others are ink or paper.
@@ -94,6 +98,8 @@ impl Default for Options {
             reserved: false,
             colours: Vec::new(),
             tolerance: None,
+            scale: 1.0,
+            turn: Turn::None,
             pages: Pages::Only,
             tones: InkSet::EMPTY,
             across: 1,

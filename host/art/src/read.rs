@@ -19,5 +19,6 @@ pub(crate) mod picture;
 pub mod process;
 pub(crate) mod reserved;
 pub(crate) mod scans;
+pub(crate) mod seen;
 pub(crate) mod size;
 pub(crate) mod svg;

@@ -1,7 +1,7 @@
 //! Reading art, dot by dot, from files that other means than the readers made.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 mod archives;
 mod damage;
@@ -26,8 +26,8 @@ use super::*;
 use crate::colour::packed;
 use crate::dots::bitplane;
 use crate::read::file;
-use crate::read::pdf::Interpreter;
-use observe::Silent;
+use crate::read::pdf::{Interpreter, Part};
+use observe::{Diagnosis, Silent};
 use protocol::ink::Ink;
 use tempfile::TempDir;
 use testing::needs::ghostscript;
@@ -72,6 +72,12 @@ impl Bench {
         fs::write(self.path(name), bytes).unwrap();
         self.path(name)
     }
+}
+
+/// The spot colours of each page of a document that are layers.
+fn spots_of(file: &Path) -> Result<Vec<Vec<String>>, Diagnosis> {
+    let survey = pdf::survey(file, Part::Sheet, &Silent)?;
+    Ok(survey.pages.into_iter().map(|page| page.spots).collect())
 }
 
 fn read(paths: &[PathBuf], options: &Options) -> Artwork {

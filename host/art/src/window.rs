@@ -1,6 +1,7 @@
 //! A rectangle of a picture's pixels, such as the part that is drawn or the part to print.
 
 use rayon::prelude::*;
+use sheet::Turn;
 
 /// A rectangle in pixels.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -16,6 +17,12 @@ pub struct Window {
 }
 
 impl Window {
+    /// The whole of a picture of so many pixels across and down.
+    #[must_use]
+    pub fn whole((width, height): (usize, usize)) -> Window {
+        Window { left: 0, top: 0, width, height }
+    }
+
     /// The smallest window around all pixels with a byte other than `ground`. A pixel has `bytes` bytes, a row has `width`
     /// pixels.
     pub fn around(pixels: &[u8], width: usize, bytes: usize, ground: u8) -> Option<Window> {
@@ -35,6 +42,21 @@ impl Window {
             .reduce_with(|a, b| [a[0].min(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].max(b[3])])?;
         let (left, right) = (first / bytes, last / bytes);
         Some(Window { left, top, width: right + 1 - left, height: bottom + 1 - top })
+    }
+
+    /// The same window of a picture that is turned; `size` is that before the turn.
+    #[must_use]
+    pub fn turned(self, size: (usize, usize), turn: Turn) -> Window {
+        let Window { left, top, width, height } = self;
+        let (right, below) = (size.0 - left - width, size.1 - top - height);
+        let (left, top) = match turn {
+            Turn::None => (left, top),
+            Turn::Left => (top, right),
+            Turn::Half => (right, below),
+            Turn::Right => (below, left),
+        };
+        let (width, height) = turn.sides((width, height));
+        Window { left, top, width, height }
     }
 
     /// The smallest window around both.

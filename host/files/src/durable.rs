@@ -18,6 +18,21 @@ use std::path::{Path, PathBuf};
 /// How the names of files begin that are not finished.
 pub const STAGED: &str = ".new.";
 
+/// The bytes that are free where a folder stands; `None` where the system does not tell.
+#[must_use]
+pub fn free(folder: &Path) -> Option<u64> {
+    #[cfg(unix)]
+    {
+        let found = rustix::fs::statvfs(folder).ok()?;
+        Some(found.f_bavail.saturating_mul(found.f_frsize))
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = folder;
+        None
+    }
+}
+
 /// Who may read a file. Only its owner may change it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Access {

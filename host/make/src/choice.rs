@@ -6,6 +6,7 @@ use appearance::factor::Method;
 use appearance::gamut::{self, Intent};
 use art::Accept;
 use inks::Trust;
+use press::layout::fit::Scaling;
 
 use crate::view::Show;
 
@@ -140,6 +141,16 @@ impl Choice for Accept {
             Accept::WhiteKept.name(),
             "White beneath the colours of a page that knock it out",
         ),
+    ];
+}
+
+impl Choice for Scaling {
+    const ALL: &'static [(Scaling, &'static str, &'static str)] = &[
+        (Scaling::Auto, Scaling::Auto.name(), "Turned, and made smaller if it is too large"),
+        (Scaling::AutoFit, Scaling::AutoFit.name(), "The same"),
+        (Scaling::Fit, Scaling::Fit.name(), "As large as the printable area holds"),
+        (Scaling::Fill, Scaling::Fill.name(), "The whole sheet is covered, and the rest cut"),
+        (Scaling::None, Scaling::None.name(), "As large as it is, in the middle of the sheet"),
     ];
 }
 

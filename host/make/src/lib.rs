@@ -36,6 +36,7 @@ pub use {appearance, art, halftone, inks, observe, press, protocol, sheet, view 
 
 pub mod choice;
 mod error;
+pub mod fitted;
 pub mod layers;
 pub mod made;
 pub mod options;

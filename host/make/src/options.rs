@@ -13,6 +13,7 @@ use std::ops::RangeInclusive;
 use art::{Finish, GAMMAS, Intent, TOLERANCES, White};
 use halftone::Method;
 use inks::InkSet;
+use press::layout::fit::Wish;
 use press::layout::{Point, Profile};
 use protocol::ink::{Ink, Kind};
 use protocol::paper::Paper;
@@ -116,6 +117,9 @@ pub struct Choices {
     pub halftone: Method,
     /// Where the drawing goes on its sheet.
     pub place: Place,
+    /// How pages are laid on [`paper`](Self::paper), the sheet that is given; without it each page has a
+    /// sheet of its own size.
+    pub fit: Option<Wish>,
     /// Whether pages are mirrored left to right.
     pub mirror: bool,
     /// Whether the sheet has a custom size, rather than that of the paper nearest to it.
@@ -149,6 +153,7 @@ impl Default for Choices {
             gamma: more.gamma,
             halftone: more.halftone,
             place: Place::Page,
+            fit: None,
             mirror: false,
             custom_paper: false,
             profile: Profile::default(),

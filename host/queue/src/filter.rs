@@ -1,16 +1,18 @@
 //! The filter: pages in, jobs in the printer's language out, one for each sheet.
 //!
-//! Problem: the print system hands over PDF or pictures of pages, whole sheets with margins this printer cannot print on.
-//! Method: a PDF is drawn by Ghostscript, which also tells what drew each pixel; each page becomes art as if it were a
-//! picture given to `foilpress layers`: text keeps its outline, reserved colours are inks of their own if wanted, everything
-//! else is halftoned in process inks. A page with spot colours that name inks is separated, too, and the plates of these are
-//! layers. The whole page is halftoned, as `foilpress layers` does it, so both make the same dots. It is laid where the user wants what is
-//! drawn on it, on a sheet of the page's size; what lies on the margins is reported in millimetres.
-//! Cost: the page at a bit or four bytes a pixel, and what [`art`] costs; for documents that may have spot colours, one
-//! more drawing of all pages at a low resolution; for those that may have gradients that Ghostscript leaves out, a run
-//! without output.
-//! Limits: documents of 1 GB and 1000 pages, sheets the printer takes, upright. Transparency is gone when a page has been
-//! drawn, so white cannot follow it.
+//! Problem: the print system hands over PDF or pictures of pages, of any size, with margins this printer cannot print on.
+//! Method: a PDF is drawn by Ghostscript, which also tells what drew each pixel; each page becomes art as if it
+//! were a picture given to `foilpress layers`: text keeps its outline, reserved colours are inks of their own if
+//! wanted, everything else is halftoned in process inks. A page with spot colours that name inks is separated,
+//! too, and the plates of these are layers. The whole page is halftoned, as `foilpress layers` does it, so both make
+//! the same dots. It is fitted to the sheet that is given, and drawn as large as it is printed
+//! ([`press::layout::fit`]); a print queue's page has a sheet of its own size. What lies on the margins is told in
+//! millimetres.
+//! Cost: the page at a bit or four bytes a pixel, and what [`art`] costs; for documents that may have spot
+//! colours, one more drawing of all pages at a low resolution; for those that may have gradients that Ghostscript
+//! leaves out, a run without output; where pages get another scale than the one before, one more start.
+//! Limits: documents of 1 GB and 1000 pages. Transparency is gone when a page has been drawn, so white cannot
+//! follow it.
 
 mod page;
 
@@ -19,18 +21,17 @@ use std::path::Path;
 
 use inks::Library;
 use protocol::ink::Ink;
-use protocol::paper::Paper;
 use tempfile::NamedTempFile;
 
 use super::options::NoChoice;
 use super::raster::{self, RasterError};
-use art::Page;
 use art::pdf::{DrawError, Drawer, Drawing, Interpreter, Part, Survey, Suspected};
 use art::process::{MOST_PAGES, ProcessError};
 use make::options::{Choices, Spots, is_chosen};
 use observe::{Diagnosis, Fault, Observer};
-use page::Press;
+use page::{Laid, Of, Press};
 use press::layout::Cut;
+use press::layout::fit::FitError;
 use press::pipeline::JobError;
 
 /// The largest document.
@@ -89,10 +90,18 @@ pub enum FilterError {
         /// Why the printer does not take it.
         problem: String,
     },
+    /// A page that cannot be laid on the sheet.
+    #[error("page {page} cannot be laid on the sheet")]
+    Fit {
+        /// Page, from 1.
+        page: usize,
+        /// Why not.
+        source: FitError,
+    },
     /// Nothing to print, though something is drawn.
     #[error(
         "there is nothing to print: everything on page {page} lies on the margins, where the printer cannot print ({beyond}); move it \
-         further in, or print it in the middle of the sheet with FoilpressPosition=Centre"
+         further in, have it fitted to the sheet, or print it in its middle with FoilpressPosition=Centre"
     )]
     Margins {
         /// Page, from 1.
@@ -159,9 +168,20 @@ fn io_error(what: &'static str) -> impl FnOnce(io::Error) -> FilterError {
     move |source| FilterError::Io { what, source }
 }
 
+/// What became of a document.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Filtered {
+    /// Jobs that were written, one for each sheet.
+    pub jobs: usize,
+    /// How pages were turned, scaled and cut, in words.
+    pub laid: Vec<String>,
+    /// Whether anything that is drawn was cut.
+    pub is_cut: bool,
+}
+
 /// Makes jobs of a document. A page on which nothing is drawn becomes no job, with a note.
 ///
-/// `document` is read from its start; `file` is where it can be read again, if it is a file. Returns the number of jobs.
+/// `document` is read from its start; `file` is where it can be read again, if it is a file.
 pub fn run(
     mut document: impl Read,
     file: Option<&Path>,
@@ -169,13 +189,13 @@ pub fn run(
     library: &Library,
     out: &mut dyn Write,
     observer: &dyn Observer,
-) -> Result<usize, FilterError> {
+) -> Result<Filtered, FilterError> {
     let mut head = [0; 4];
     document.read_exact(&mut head).map_err(|error| match error.kind() {
         io::ErrorKind::UnexpectedEof => FilterError::Empty,
         _ => io_error("read the document")(error),
     })?;
-    let mut press = Press { choices, library, out, observer, pages: 0, jobs: 0, white: 0, in_margins: None };
+    let mut press = Press::new((choices, library), out, observer);
     if head == raster::SYNC {
         pictures(raster::Reader::behind_sync(BufReader::with_capacity(1 << 16, document)), &mut press)?;
     } else if raster::APPLE.starts_with(&head) {
@@ -207,7 +227,7 @@ pub fn run(
         None if press.pages > 0 && !(1..=press.pages).any(|page| is_chosen(&choices.pages, page)) => {
             Err(FilterError::NotChosen(press.pages))
         }
-        _ => Ok(press.jobs),
+        _ => Ok(press.filtered()),
     }
 }
 
@@ -226,22 +246,22 @@ fn pictures(mut reader: raster::Reader<impl Read>, press: &mut Press<'_>) -> Res
     while let Some(page) = reader.next_page()? {
         number += 1;
         within_limit(number)?;
-        let size = (page.width, page.height);
-        let paper = page::paper(number, size, page.dpi, press.choices)?;
+        let (size, dpi) = ((page.width, page.height), f64::from(page.dpi));
         let mut rgb = Vec::with_capacity(3 * page.width * page.height);
         for _ in 0..page.height {
             reader.row(&mut row)?;
             rgb.extend_from_slice(&row);
         }
-        // Of a PDF the print system has turned the pages itself.
-        let job = picture(
-            number,
-            paper,
-            (size, page.dpi),
-            Page::plain(rgb, page.width),
-            press.choices.mirror,
-            press,
-        )?;
+        if !press.wants(number) {
+            continue;
+        }
+        let laid = press.laid(number, mm(size, dpi), Of::Raster)?;
+        let drawn = art::Page::plain(rgb, page.width);
+        let (bounds, dpi) = (drawn.bounds(), dpi / laid.fit.scale);
+        // Of a PDF the print system has mirrored the pages itself.
+        let mirrored = press.choices.mirror;
+        let art = |name: &str, options: &art::Options| drawn.art(name, dpi, options);
+        let job = press.page(number, &laid, (size, dpi, bounds), mirrored, art)?;
         for _ in 0..page.copies {
             press.write(&job)?;
         }
@@ -249,51 +269,68 @@ fn pictures(mut reader: raster::Reader<impl Read>, press: &mut Press<'_>) -> Res
     Ok(())
 }
 
+/// Width and length of so many pixels in millimetres.
+fn mm((width, height): (usize, usize), dpi: f64) -> (f64, f64) {
+    (25.4 * width as f64 / dpi, 25.4 * height as f64 / dpi)
+}
+
 /// The pages of a PDF or PostScript file.
 fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
-    let dpi = press.choices.dpi;
     if let Some(doubt) = art::pdf::cut_short(path) {
         press.observer.note(&doubt);
     }
     let suspected = Suspected::of(path).map_err(io_error("read the document"))?;
-    let whole = |interpreter| Survey { spots: Vec::new(), interpreter };
-    let Survey { spots, interpreter } = match press.choices.spots {
+    let whole = |interpreter| Survey { pages: Vec::new(), interpreter };
+    let Survey { pages, interpreter } = match press.choices.spots {
         Spots::None if suspected.gradients => whole(art::pdf::interpreter(path)),
         Spots::None => whole(Interpreter::Usual),
-        _ if suspected.spots => {
-            art::pdf::survey(path, press.observer).map_err(|error| match of_document(error) {
+        _ if suspected.spots => art::pdf::survey(path, press.part(), press.observer).map_err(|error| {
+            match of_document(error) {
                 error if error.fault() == Fault::Name => FilterError::Spot(error),
                 error => FilterError::Plates(error),
-            })?
-        }
+            }
+        })?,
         _ if suspected.gradients => whole(art::pdf::interpreter(path)),
         _ => whole(Interpreter::Usual),
     };
     if interpreter == Interpreter::Older {
         press.observer.note(art::pdf::OLDER);
     }
-    if spots.iter().all(Vec::is_empty) {
+    if pages.iter().all(|page| page.spots.is_empty()) {
         return drawn((path, interpreter), (None, suspected.overprint), press);
     }
-    for (number, plates) in (1..).zip(&spots) {
-        if plates.is_empty() {
+    for (number, surveyed) in (1..).zip(&pages) {
+        if !press.wants(number) {
+            continue;
+        }
+        if surveyed.spots.is_empty() {
             drawn((path, interpreter), (Some(number), suspected.overprint), press)?;
             continue;
         }
+        // To a dot, as other pages are measured.
+        let dpi = f64::from(press.choices.dpi);
+        let size = mm((side(dpi * surveyed.inches.0), side(dpi * surveyed.inches.1)), dpi);
+        let laid = press.laid(number, size, Of::Document)?;
         let in_page = |error| FilterError::Layers { page: number, source: of_document(error) };
-        let page = art::pdf::separated(path, interpreter, number, dpi.into()).map_err(in_page)?;
+        let part = press.part();
+        let page =
+            art::pdf::separated(path, interpreter, (number, part), dpi * laid.fit.scale).map_err(in_page)?;
         let spots: Vec<&str> = page.spots().collect();
         if !spots.is_empty() {
             press.observer.note(&format!("page {number}: {} printed as inks", spots.join(", ")));
         }
-        let paper = page::paper(number, page.size, dpi, press.choices)?;
-        if let Some(view) = press.view(number, paper, (page.size, dpi), page.bounds(), false)? {
-            let art = page.art(&format!("page {number}"), &press.options(dpi)).map_err(in_page)?;
-            let job = press.job(number, paper, &art, &view, false)?;
-            press.write(&job)?;
-        }
+        let (size, bounds) = (page.size, page.bounds());
+        let art = |name: &str, options: &art::Options| page.art(name, dpi, options).map_err(of_document);
+        let job = press.page(number, &laid, (size, dpi, bounds), false, art)?;
+        press.write(&job)?;
     }
     Ok(())
+}
+
+/// So many pixels, as whole ones.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a cast of floats saturates")]
+fn side(pixels: f64) -> usize {
+    pixels.round() as usize
 }
 
 /// An error without the name of the file where the document is kept, which its owner never sees.
@@ -312,32 +349,62 @@ fn drawn(
     (only, overprints): (Option<usize>, bool),
     press: &mut Press<'_>,
 ) -> Result<(), FilterError> {
-    let dpi = press.choices.dpi;
-    let page = only.and_then(|page| u32::try_from(page).ok());
-    let drawing = Drawing {
-        path,
-        interpreter,
-        page,
-        part: Part::Sheet,
-        dpi: (dpi.into(), dpi.into()),
-        overprints,
-        // Print systems draw sheets, not transparent ones.
-        has_ground: false,
-    };
-    let mut drawer = Drawer::begin(&drawing).map_err(undrawn)?;
+    let dpi = f64::from(press.choices.dpi);
     let first = only.unwrap_or(1);
-    let mut number = first;
+    // Pages from a number on, drawn so many times as large.
+    let begin = |number: usize, scale: f64, part: Part| {
+        let page = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+        let last = only.map_or(MOST_PAGES + 1, page);
+        Drawer::begin(&Drawing {
+            path,
+            interpreter,
+            pages: Some((page(number), last)).filter(|_| only.is_some() || number > 1),
+            part,
+            dpi: (dpi * scale, dpi * scale),
+            overprints,
+            // Print systems draw sheets, not transparent ones.
+            has_ground: false,
+        })
+    };
+    let (mut number, mut scale) = (first, 1.0);
+    let mut drawer = begin(number, scale, press.part()).map_err(undrawn)?;
+    // How a page is laid that is drawn again, for its size is known best before that.
+    let mut known: Option<Laid> = None;
     while let Some(size) = drawer.next_page().map_err(undrawn)? {
         within_limit(number)?;
-        let paper = page::paper(number, size, dpi, press.choices)?;
+        if !press.wants(number) {
+            drawer.page(size).map_err(undrawn)?;
+            number += 1;
+            continue;
+        }
+        let laid = match known.take() {
+            Some(laid) => laid,
+            None => {
+                let laid = press.laid(number, mm(size, dpi * scale), Of::Document)?;
+                // A page is as large as it should be if it is so to a pixel.
+                let pixel = 1.0 / size.0.max(size.1).max(1) as f64;
+                if (laid.fit.scale / scale - 1.0).abs() > pixel {
+                    scale = laid.fit.scale;
+                    drawer = begin(number, scale, press.part()).map_err(undrawn)?;
+                    known = Some(laid);
+                    continue;
+                }
+                laid
+            }
+        };
         let page = drawer.page(size).map_err(undrawn)?;
-        let job = picture(number, paper, (size, dpi), page, false, press)?;
+        let bounds = page.bounds();
+        let art = |name: &str, options: &art::Options| page.art(name, dpi, options);
+        let job = press.page(number, &laid, (size, dpi, bounds), false, art)?;
         press.write(&job)?;
         number += 1;
     }
     let said = drawer.end().map_err(undrawn)?;
     if number == first {
-        return Err(FilterError::NoPage(art::pdf::no_page(&said, page)));
+        return Err(FilterError::NoPage(art::pdf::no_page(
+            &said,
+            only.and_then(|page| u32::try_from(page).ok()),
+        )));
     }
     if let Some(damage) = art::pdf::damaged(&said) {
         press.observer.note(&damage);
@@ -349,29 +416,14 @@ fn drawn(
 fn undrawn(error: DrawError) -> FilterError {
     match error {
         DrawError::Process(ProcessError::Start(error)) => FilterError::NoGhostscript(error),
+        DrawError::Process(ProcessError::Failed(why)) => match art::pdf::impossible_size(&why) {
+            Some(size) => FilterError::NoPage(size),
+            None => FilterError::Ghostscript(observe::with_causes(&ProcessError::Failed(why))),
+        },
         DrawError::Process(error) => FilterError::Ghostscript(observe::with_causes(&error)),
         DrawError::Folder(source) => FilterError::Io { what: "make a temporary folder", source },
         DrawError::Read(source) => FilterError::Io { what: "read what Ghostscript draws", source },
     }
-}
-
-/// The job of a page that is a picture; empty if nothing is on it.
-fn picture(
-    number: usize,
-    paper: Paper,
-    (size, dpi): ((usize, usize), u16),
-    page: Page,
-    mirrored: bool,
-    press: &mut Press<'_>,
-) -> Result<Vec<u8>, FilterError> {
-    let Some(view) = press.view(number, paper, (size, dpi), page.bounds(), mirrored)? else {
-        return Ok(Vec::new());
-    };
-    let name = format!("page {number}");
-    let art = page
-        .art(&name, dpi, &press.options(dpi))
-        .map_err(|source| FilterError::Layers { page: number, source })?;
-    press.job(number, paper, &art, &view, mirrored)
 }
 
 #[cfg(test)]
@@ -472,7 +524,7 @@ mod tests {
             run(io::Cursor::new(pages), None, &choices, &Library::builtin(), &mut Vec::new(), &Silent)
         };
         assert!(matches!(chosen(&pages.concat(), 3..=9), Err(FilterError::NotChosen(2))));
-        assert!(matches!(chosen(&pages.concat(), 2..=9), Ok(1)));
+        assert!(matches!(chosen(&pages.concat(), 2..=9), Ok(Filtered { jobs: 1, .. })));
         assert!(matches!(chosen(b"\x89PNG\r\n", 2..=2), Err(FilterError::NotChosen(1))));
     }
 
@@ -549,7 +601,9 @@ mod tests {
     #[test]
     fn a_page_that_does_not_go_in_is_refused_with_its_size() {
         let usual = read(&[], None).unwrap();
-        let error = page::paper(3, (7016, 4961), 600, &usual).unwrap_err().to_string();
+        let (library, mut out) = (Library::builtin(), io::sink());
+        let press = Press::new((&usual, &library), &mut out, &Silent);
+        let error = press.laid(3, (297.0, 210.0), Of::Document).unwrap_err().to_string();
         assert!(error.contains("page 3 is 297 x 210 mm") && error.contains("215.9 x 355.6 mm"), "{error}");
     }
 

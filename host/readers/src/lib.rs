@@ -46,7 +46,7 @@ pub use fault::Fault;
 pub use layered::{Layered, is_layered};
 pub use picture::{Picture, Plane, PlaneKind, Process, Raster};
 pub use pixels::{Pixel, Pixels, open_exr, png};
-pub use read::{Flaw, flaw, is_picture, read, size};
+pub use read::{Flaw, flaw, is_picture, read, size, stated};
 pub use request::Request;
 pub use stored::{Format, Header, Samples, Stored};
 pub use tiff::pages::{count as pages, is_tiff};
@@ -129,7 +129,7 @@ pub(crate) fn open(bytes: &[u8], format: ImageFormat, bounds: Bounds) -> ImageRe
     Ok(Opened { decoder: Box::new(reader.into_decoder()?) })
 }
 
-fn limits(bounds: Bounds) -> Limits {
+pub(crate) fn limits(bounds: Bounds) -> Limits {
     let mut limits = Limits::default();
     (limits.max_image_width, limits.max_image_height) = (bounds.side, bounds.side);
     limits.max_alloc = Some(bounds.bytes);

@@ -9,17 +9,21 @@
 //! allocated. A damaged colour profile is no reason to refuse a picture.
 
 use std::fmt::Display;
-use std::io::{BufRead, ErrorKind, Seek};
+use std::io::{BufRead, Cursor, ErrorKind, Seek};
 use std::path::Path;
 
-use image::{ImageError, ImageFormat, ImageReader};
+use image::metadata::Orientation;
+use image::{ImageDecoder as _, ImageError, ImageFormat, ImageReader};
 use observe::Diagnosis;
 
 use crate::picture::{Picture, Raster};
 use crate::request::{CUT_SHORT, Request, reduced, whole_jpeg};
-use crate::resolution;
+use crate::resolution::{self, Dpi};
 use crate::turn::Turn;
 use crate::{Bounds, cmyk, foreign, jpeg, tiff};
+
+/// What reading a header may take: profiles and previews are smaller.
+const MOST_OF_HEADER: u64 = 1 << 26;
 
 /// How much of a file tells its format.
 const START: usize = 1 << 12;
@@ -117,6 +121,17 @@ pub fn is_picture(start: &[u8]) -> bool {
 /// Pixels across and down, from the header of a picture.
 pub fn size(file: impl BufRead + Seek) -> Option<(u32, u32)> {
     ImageReader::new(file).with_guessed_format().ok()?.into_dimensions().ok()
+}
+
+/// Pixels across and down of a picture, the right way up, and its resolution if it states one, from its
+/// header; `None` if it has none that is read.
+pub fn stated(bytes: &[u8], name: &Path) -> Option<((u32, u32), Option<Dpi>)> {
+    let format = format(bytes, name, "").ok()?;
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    reader.limits(crate::limits(Bounds { side: None, bytes: MOST_OF_HEADER }));
+    let mut decoder = reader.into_decoder().ok()?;
+    let turn = Turn(decoder.orientation().unwrap_or(Orientation::NoTransforms));
+    Some((turn.size(decoder.dimensions()), turn.dpi(resolution::of_file(bytes, format))))
 }
 
 /// Why a picture cannot be drawn to its end.

@@ -23,6 +23,7 @@ pub mod pack;
 pub mod picture;
 mod plane;
 mod size;
+mod turn;
 
 use std::borrow::Cow;
 
@@ -34,6 +35,7 @@ pub use colours::{colours, label};
 pub use dots::{DotMap, SheetError, census, check_stacks};
 pub use plane::Plane;
 pub use size::{NoSize, Size};
+pub use turn::Turn;
 
 /// Dots in a millimetre at 600 dpi, the resolution of every dot map and sheet.
 pub const DOTS_PER_MM: f64 = 600.0 / 25.4;

@@ -52,6 +52,7 @@ const GROUPS: &[(&str, &[&str])] = &[
         "Page",
         &[
             "size",
+            "fit",
             "resolution",
             "paper",
             "at",

@@ -80,7 +80,7 @@ fn layers_and_a_queue_make_the_same_dots_of_a_page() {
 #[test]
 fn layers_and_a_queue_make_the_same_dots_of_a_picture() {
     let bench = Bench::new();
-    // As wide as the room, and low: it states no size.
+    // Wide and low, and it states no size: it is turned and fitted.
     let picture = RgbImage::from_fn(1200, 40, |x, y| match (x, y) {
         (40..390, 10..30) => Rgb([230, 126, 34]),
         (420..424, _) => Rgb([0; 3]),
@@ -88,6 +88,7 @@ fn layers_and_a_queue_make_the_same_dots_of_a_picture() {
         _ => Rgb([255; 3]),
     });
     picture.save(bench.path("art.png")).expect("a picture");
-    let (queued, layers) = (by_queue(&bench, "art.png", ""), by_layers(&bench, "art.png --paper a4"));
+    let (queued, layers) =
+        (by_queue(&bench, "art.png", ""), by_layers(&bench, "art.png --paper a4 --fit auto"));
     assert!(queued.len() > 2 && queued == layers);
 }

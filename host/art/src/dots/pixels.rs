@@ -11,10 +11,12 @@ use std::sync::LazyLock;
 use crate::colour::packed::{DRAWN, Key, LABEL, colour, key, of_drawn};
 use crate::dots::edges::Edges;
 use crate::dots::resample;
+use crate::dots::turn;
 use crate::read::object_type::{BYTES, INKS_OF_PICTURES, ObjectType, split};
 use appearance::srgb;
 use appearance::wide::wide;
 use rayon::prelude::*;
+use sheet::Turn;
 
 /// Pixels that are looked at together: most of a page is paper.
 const BLOCK: usize = 32;
@@ -36,6 +38,13 @@ pub(crate) struct Pixels {
 }
 
 impl Pixels {
+    /// The same pixels, turned.
+    pub fn turned(self, turn: Turn) -> Pixels {
+        let size = (self.width, self.height);
+        let (width, height) = turn.sides(size);
+        Pixels { bytes: turn::samples(self.bytes, self.each, size, turn), width, height, ..self }
+    }
+
     /// What writes the colours of rows of so many dots; `labels` says whether text is a label.
     pub fn rows(&self, dots: (usize, usize), labels: bool) -> Box<Rows<'_>> {
         match self.each {

@@ -70,6 +70,7 @@ pub fn open(paths: &[PathBuf], options: &Options, observer: &dyn Observer) -> Re
             named_files(&common_name(files), files, options, observer)?
         }
     };
+    art = art.turned(options.turn);
     art.across = options.across.max(1);
     art.name.retain(|c| !c.is_control());
     if art.name.trim().is_empty() {

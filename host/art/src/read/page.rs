@@ -111,18 +111,18 @@ impl Page {
         }
     }
 
-    /// The page as art. It was drawn at `dpi` pixels an inch.
+    /// The page as art. It is printed at `dpi` pixels an inch.
     ///
     /// # Errors
     /// No dots, or more than 65535 on a side.
-    pub fn art(self, name: &str, dpi: u16, options: &Options) -> Result<Artwork, Diagnosis> {
+    pub fn art(self, name: &str, dpi: f64, options: &Options) -> Result<Artwork, Diagnosis> {
         let (width, height) = self.size();
         let problem = || {
             let problem =
                 format!("the page is {width} x {height} pixels; expected 1 to 65535 dots on a side");
             wrong(Path::new(name), problem)
         };
-        let dots = size::page_dots((width, height), dpi.into()).ok_or_else(problem)?;
+        let dots = size::page_dots((width, height), dpi).ok_or_else(problem)?;
         u32::try_from(width).and(u32::try_from(height)).map_err(|_| problem())?;
         Ok(self.at(name, dots, options))
     }
@@ -285,7 +285,7 @@ mod tests {
             prop_assert!(!numbered || tone.is_none() && !is_black);
             prop_assert!(numbered || tone.is_some() || is_black || most > 5);
             prop_assert_eq!(found.bounds(), whole.bounds());
-            let (dpi, options) = (if draft { 300 } else { 600 }, Options::default());
+            let (dpi, options) = (if draft { 300.0 } else { 600.0 }, Options::default());
             let found = found.art("page", dpi, &options).unwrap();
             let whole = whole.art("page", dpi, &options).unwrap();
             prop_assert_eq!(&found.drawn, &whole.drawn);

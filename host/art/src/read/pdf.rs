@@ -39,11 +39,11 @@ use files::shelf::Disk;
 use observe::{Diagnosis, Observer};
 use readers::Raster;
 
-pub use complaint::{OLDER, cut_short, damaged, no_page};
+pub use complaint::{OLDER, cut_short, damaged, impossible_size, no_page};
 pub use draw::Part;
 pub use drawer::{DrawError, Drawer, Drawing};
 pub use ghostscript::{Interpreter, command, interpreter, order};
-pub use plates::{Separated, Survey, separated, survey};
+pub use plates::{Separated, Survey, Surveyed, separated, survey};
 pub use suspected::Suspected;
 
 /// How far from the beginning of a file readers look for the header of a PDF. Source: Adobe's implementation
@@ -148,9 +148,9 @@ fn drawn_at_once(
     let drawing = Drawing {
         path,
         interpreter,
-        page: options.page(),
+        pages: options.page().map(|page| (page, page)),
         part: Part::CropBox,
-        dpi: (size::DPI * options.across.max(1) as f64, size::DPI),
+        dpi: resolution(options),
         overprints: suspected.overprint,
         has_ground: true,
     };
@@ -171,6 +171,12 @@ fn drawn_at_once(
     Ok(Some((art, said, interpreter)))
 }
 
+/// Pixels an inch, across and down, at which a page of a document has a pixel for each dot.
+fn resolution(options: &Options) -> (f64, f64) {
+    let dpi = size::DPI * options.scale;
+    (dpi * options.across.max(1) as f64, dpi)
+}
+
 /// Refuses a page of so many dots that is too large to be read or printed.
 fn sized(
     path: &Path,
@@ -183,7 +189,9 @@ fn sized(
     let across = options.across.max(1) as f64;
     let unstated = Unstated::Drawing { rounded_mm: size::MM };
     let pixels = (width as f64 / across, length as f64);
-    size::dots(path, pixels, Some((size::DPI, size::DPI)), unstated, options, notes).map(|_| ())
+    // It is drawn as large as it is printed.
+    let dpi = size::DPI * options.scale;
+    size::dots(path, pixels, Some((dpi, dpi)), unstated, options, notes).map(|_| ())
 }
 
 /// Why a document is not drawn.
@@ -193,6 +201,30 @@ fn undrawn(path: &Path, error: DrawError) -> Diagnosis {
         DrawError::Folder(source) => io(path, "make a folder for its pages")(source),
         DrawError::Read(source) => io(path, "read its page")(source),
     }
+}
+
+/// The only page that holds art; the first if none does.
+fn only<'a>(path: &Path, leaves: &'a [Leaf]) -> Result<&'a Leaf, Diagnosis> {
+    let drawn: Vec<&Leaf> = leaves.iter().filter(|leaf| leaf.drawn).collect();
+    match drawn[..] {
+        [] => Ok(&leaves[0]),
+        [one] => Ok(one),
+        _ => Err(several_pages(path, &drawn.iter().map(|leaf| leaf.number).collect::<Vec<u32>>())),
+    }
+}
+
+/// Width and length in millimetres of the page that would be read, to a dot.
+pub(crate) fn size_mm(path: &Path, options: &Options) -> Result<(f64, f64), Diagnosis> {
+    let folder = Scratch::new().map_err(io(path, "make a folder for its pages"))?;
+    let bare = from_its_header(path, &folder).map_err(io(path, "read it"))?;
+    let bare = bare.as_deref().unwrap_or(path);
+    let drafts = Scratch::new().map_err(io(path, "make a folder for its pages"))?;
+    let (Drafts { leaves, said }, _) = draw::drafts(bare, options.page(), Part::CropBox, &drafts)
+        .map_err(|error| error.calling_it(&path.display().to_string()))?;
+    let first = leaves.first().ok_or_else(|| wrong(path, no_page(&said, options.page())))?;
+    let leaf = if options.pages == Pages::Only { only(path, &leaves)? } else { first };
+    let mm = |draft: f64| (size::DPI * draft / DRAFT).round() * size::MM;
+    Ok((mm(leaf.size.0), mm(leaf.size.1)))
 }
 
 /// A document and how it is read.
@@ -207,15 +239,7 @@ struct Document<'a> {
 impl Document<'_> {
     /// The only page that holds art; the first if none does.
     fn only_page(&self, leaves: &[Leaf]) -> Result<Artwork, Diagnosis> {
-        let drawn: Vec<&Leaf> = leaves.iter().filter(|leaf| leaf.drawn).collect();
-        let leaf = match drawn[..] {
-            [] => &leaves[0],
-            [one] => one,
-            _ => {
-                let pages: Vec<u32> = drawn.iter().map(|leaf| leaf.number).collect();
-                return Err(several_pages(self.path, &pages));
-            }
-        };
+        let leaf = only(self.path, leaves)?;
         let mut art = self.page(leaf)?;
         if leaves.len() > 1 {
             art.notes.push(format!(
@@ -258,7 +282,7 @@ impl Document<'_> {
         let drawing = Drawing {
             path: self.path,
             interpreter: self.interpreter,
-            page: Some(leaf.number),
+            pages: Some((leaf.number, leaf.number)),
             part: Part::CropBox,
             dpi,
             overprints: self.overprints,
@@ -338,7 +362,7 @@ impl Document<'_> {
         let unstated = Unstated::Drawing { rounded_mm: leaf.rounded_mm };
         let dots = size::dots(self.path, leaf.size, Some((DRAFT, DRAFT)), unstated, self.options, notes)?;
         if self.options.size.is_none() {
-            return Ok((size::DPI * self.options.across.max(1) as f64, size::DPI));
+            return Ok(resolution(self.options));
         }
         Ok((DRAFT * dots.0 as f64 / leaf.size.0, DRAFT * dots.1 as f64 / leaf.size.1))
     }

@@ -77,7 +77,8 @@ impl Fit {
     }
 }
 
-/// The size in dots of a picture of so many pixels: as set, else as the file states, else by `unstated`, with a note.
+/// The size in dots of a picture of so many pixels: as set, else as the file states, else by `unstated`, with a note; the latter
+/// two times the scale.
 ///
 /// # Errors
 /// Art larger than the room or than the largest page, or smaller than a dot.
@@ -89,6 +90,7 @@ pub(crate) fn dots(
     options: &Options,
     notes: &mut Vec<String>,
 ) -> Result<(usize, usize), Diagnosis> {
+    let pixels = (options.scale * pixels.0, options.scale * pixels.1);
     let inches = |(x, y): Dpi| (25.4 * pixels.0 / x, 25.4 * pixels.1 / y);
     let drawing = matches!(unstated, Unstated::Drawing { .. });
     let asked = options.dpi.filter(|_| !drawing);

@@ -91,7 +91,7 @@ fn spots_keep_their_plates_whatever_characters_their_names_have() {
         assert!(art.notes.iter().any(|said| said.ends_with(&note)), "{:?}", art.notes);
         assert!(!art.notes.iter().any(|said| said.contains("left out")), "{:?}", art.notes);
         // The queue's way.
-        assert_eq!(pdf::survey(&file, &Silent).unwrap().spots, [["White/Under"]], "{name}");
+        assert_eq!(spots_of(&file).unwrap(), [["White/Under"]], "{name}");
     }
 }
 

@@ -186,17 +186,14 @@ fn spots_without_an_ink_print_by_their_process_colours_in_layers_and_queue_alike
     let note = "spot colour `Violet` names no ink: printed by its process colours";
     assert!(art.notes.iter().any(|said| said.contains(note)), "{:?}", art.notes);
     // The queue's way.
-    assert_eq!(pdf::survey(&file, &Silent).unwrap().spots, [["White"]]);
-    let page = pdf::separated(&file, Interpreter::Usual, 1, 600.0).unwrap();
-    let queued = page.art("page", &Options::default()).unwrap();
+    assert_eq!(spots_of(&file).unwrap(), [["White"]]);
+    let page = pdf::separated(&file, Interpreter::Usual, (1, Part::Sheet), 600.0).unwrap();
+    let queued = page.art("page", 600.0, &Options::default()).unwrap();
     let keys = |art: &Artwork| art.colour.as_ref().map(|colour| colour.keys((art.width, art.length)));
     assert_eq!((amounts(&queued), keys(&queued)), (amounts(&art), keys(&art)));
     // A slip is an error in both.
     let slip = bench.write("slip.ps", MIXED.replace("Violet", "Golld"));
-    for error in [
-        pdf::survey(&slip, &Silent).map(|found| found.spots).unwrap_err(),
-        open(&[slip], &Options::default(), &Silent).unwrap_err(),
-    ] {
+    for error in [spots_of(&slip).unwrap_err(), open(&[slip], &Options::default(), &Silent).unwrap_err()] {
         assert!(
             error
                 .to_string()
@@ -216,8 +213,8 @@ fn a_page_keeps_tints_of_its_spot_colours_in_layers_and_queue_alike() {
         1 setcolor 12 12 48 48 rectfill 0.3 setcolor 72 12 48 48 rectfill showpage\n";
     let file = bench.write("tint.ps", page);
     let art = read(std::slice::from_ref(&file), &Options::default());
-    let separated = pdf::separated(&file, Interpreter::Usual, 1, 600.0).unwrap();
-    let queued = separated.art("page", &Options::default()).unwrap();
+    let separated = pdf::separated(&file, Interpreter::Usual, (1, Part::Sheet), 600.0).unwrap();
+    let queued = separated.art("page", 600.0, &Options::default()).unwrap();
     assert_eq!(amounts(&queued), amounts(&art));
     // Both squares are 400 dots a side.
     let [(Ink::MetallicGold, gold)] = amounts(&art)[..] else { panic!("{:?}", art.notes) };

@@ -8,6 +8,7 @@
 mod block;
 pub mod camera;
 mod files;
+pub mod fit;
 mod length;
 mod marks;
 mod page;
@@ -56,7 +57,7 @@ pub struct Laid {
     pub copies: Vec<Area>,
     /// Everything that was laid out, marks included, in dots of the sheet.
     pub area: Area,
-    /// What was cut off.
+    /// What is drawn and was cut off.
     pub cut: Option<Cut>,
 }
 
@@ -177,8 +178,29 @@ pub fn arrange(dots: &DotMap, layout: &Layout, observer: &dyn Observer) -> Resul
     });
     let nothing = LayoutError::Nothing { paper: layout.paper.name() };
     let area = page::area(layout, all.meet(room)).filter(|_| !copies.is_empty()).ok_or(nothing)?;
-    let laid = Laid { grid: block.grid, marks_left_out, copies, area, cut: block.cut };
+    let cut = Cut::of(inked(dots, layout, block.place), room);
+    let laid = Laid { grid: block.grid, marks_left_out, copies, area, cut };
     Ok(Arranged { sheet, laid })
+}
+
+/// The place of all copies without what is bare at its edges: only what is drawn can be cut off.
+fn inked(dots: &DotMap, layout: &Layout, place: Rect) -> Rect {
+    let is_inked = |&stack: &u8| !dots.stacks()[usize::from(stack)].layers().is_empty();
+    let rows = || dots.index().chunks_exact(dots.width());
+    let across = layout.across();
+    let first = |row: &[u8]| row.iter().position(is_inked).map(|at| at / across);
+    let last = |row: &[u8]| row.iter().rposition(is_inked).map(|at| (row.len() - 1 - at) / across);
+    let (left, right) = (rows().filter_map(first).min(), rows().filter_map(last).min());
+    let blank = |found: Option<usize>| found.unwrap_or(0) as i64;
+    let (left, right) = if layout.mirror { (right, left) } else { (left, right) };
+    let top = blank(rows().position(|row| row.iter().any(is_inked)));
+    let below = blank(rows().rev().position(|row| row.iter().any(is_inked)));
+    Rect {
+        left: place.left + blank(left),
+        top: place.top + top,
+        right: place.right - blank(right),
+        bottom: place.bottom - below,
+    }
 }
 
 /// A paper whose area is counted in the dots of a job of this resolution.

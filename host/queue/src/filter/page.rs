@@ -1,4 +1,4 @@
-//! From the art of a page to a job: inks as the user chose them, the place on the sheet, passes, bytes.
+//! From a page to a job: how it lies on its sheet, inks as the user chose them, passes, bytes.
 
 use std::io::Write;
 use std::path::Path;
@@ -7,12 +7,15 @@ use inks::Library;
 use protocol::ink::{Ink, Kind};
 use protocol::paper::Paper;
 
-use super::{FilterError, io_error};
+use super::{FilterError, Filtered, io_error};
 use crate::ppd;
-use art::{Artwork, Room, Window};
+use art::pdf::Part;
+use art::{Artwork, Window};
+use make::fitted::{Fitted, FittedError};
 use make::options::{Choices, Place, is_chosen};
 use make::{Layers, layers};
-use observe::Observer;
+use observe::{Diagnosis, Observer};
+use press::layout::fit::{Edge, Fit, Scaling, Wish, fit};
 use press::layout::{Cut, Layout, LayoutError, Mm, Point, Position};
 use press::pipeline::JobError;
 use press::separate::CARTRIDGES;
@@ -20,7 +23,7 @@ use press::separate::CARTRIDGES;
 /// What makes jobs of pages.
 pub(super) struct Press<'a> {
     pub choices: &'a Choices,
-    pub library: &'a Library,
+    library: &'a Library,
     pub out: &'a mut dyn Write,
     pub observer: &'a dyn Observer,
     /// Pages seen.
@@ -28,12 +31,119 @@ pub(super) struct Press<'a> {
     /// Jobs written.
     pub jobs: usize,
     /// Pages on which something is white.
-    pub white: usize,
+    white: usize,
     /// The first page on which everything lies on the margins, and how far.
     pub in_margins: Option<(usize, Cut)>,
+    /// How pages lie: in words, the first of them, and how many there are.
+    said: Vec<(String, usize, usize)>,
+    is_cut: bool,
 }
 
-impl Press<'_> {
+/// What a page is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Of {
+    /// That of a document, as it was written.
+    Document,
+    /// A picture of one, which was drawn for the sheet.
+    Raster,
+}
+
+/// How a page is laid on its sheet.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct Laid {
+    paper: Paper,
+    pub fit: Fit,
+    /// Where what is drawn on it goes then.
+    place: Place,
+}
+
+/// A picture of a page: its pixels across and down, how many of them are printed in an inch, and the window
+/// around everything that is drawn on it, none if it is blank.
+pub(super) type Drawn = ((usize, usize), f64, Option<Window>);
+
+impl<'a> Press<'a> {
+    pub fn new(
+        (choices, library): (&'a Choices, &'a Library),
+        out: &'a mut dyn Write,
+        observer: &'a dyn Observer,
+    ) -> Press<'a> {
+        Press {
+            choices,
+            library,
+            out,
+            observer,
+            pages: 0,
+            jobs: 0,
+            white: 0,
+            in_margins: None,
+            said: Vec::new(),
+            is_cut: false,
+        }
+    }
+
+    /// What became of the pages.
+    pub fn filtered(&self) -> Filtered {
+        let words = |(words, first, count): &(String, usize, usize)| match count {
+            1 => format!("page {first}: {words}"),
+            _ => format!("page {first} and {} more: {words}", count - 1),
+        };
+        Filtered { jobs: self.jobs, laid: self.said.iter().map(words).collect(), is_cut: self.is_cut }
+    }
+
+    /// Says how a page lies, once for all pages of which it is true.
+    fn say(&mut self, number: usize, words: String) {
+        match self.said.iter_mut().find(|(known, ..)| *known == words) {
+            Some((.., count)) => *count += 1,
+            None => {
+                self.observer.note(&format!("page {number}: {words}"));
+                self.said.push((words, number, 1));
+            }
+        }
+    }
+
+    /// Counts a page, from 1. Whether it is among those to print.
+    pub fn wants(&mut self, number: usize) -> bool {
+        self.pages = number;
+        is_chosen(&self.choices.pages, number)
+    }
+
+    /// The part of a page in PDF that is printed: what is meant to be seen of it, or all of it where its size is the
+    /// sheet's.
+    pub fn part(&self) -> Part {
+        if self.choices.fit.is_some() { Part::CropBox } else { Part::Sheet }
+    }
+
+    /// How a page of this width and length in millimetres is laid.
+    ///
+    /// # Errors
+    /// There is no such sheet, or the page cannot be laid on the one that is given.
+    pub fn laid(&self, page: usize, size: (f64, f64), of: Of) -> Result<Laid, FilterError> {
+        let Choices { paper, place, fit: wish, custom_paper, .. } = *self.choices;
+        let Some(wish) = wish else {
+            let (width, length) = size;
+            let paper = ppd::paper_of(width, length, custom_paper);
+            let paper = paper.map_err(|problem| FilterError::Paper { page, width, length, problem })?;
+            return Ok(Laid { paper, fit: Fit::AS_IT_COMES, place });
+        };
+        let wish = match (of, wish) {
+            (Of::Document, wish) => wish,
+            // Whoever has drawn it has turned and scaled it, too.
+            (Of::Raster, Wish { scaling: Scaling::None, corner, .. }) => {
+                Wish { scaling: Scaling::None, corner, ..Wish::default() }
+            }
+            (Of::Raster, Wish { corner, .. }) => Wish { corner, ..Wish::default() },
+        };
+        let fit = fit(size, Edge::Margin, paper, &self.placed(wish))
+            .map_err(|source| FilterError::Fit { page, source })?;
+        Ok(Laid { paper, fit, place: Place::Page })
+    }
+
+    /// A wish with the place that was chosen.
+    fn placed(&self, wish: Wish) -> Wish {
+        let corner = if let Place::At(corner) = self.choices.place { Some(corner) } else { wish.corner };
+        Wish { corner, ..wish }
+    }
+
     /// Writes a job; one of no bytes is none.
     pub(super) fn write(&mut self, job: &[u8]) -> Result<(), FilterError> {
         if !job.is_empty() {
@@ -53,46 +163,85 @@ impl Press<'_> {
         }
     }
 
-    /// How a page is read, drawn at so many pixels an inch.
-    pub(super) fn options(&self, dpi: u16) -> art::Options {
+    /// How a page is read.
+    fn options(&self) -> art::Options {
         let settings = layers::Settings::of(self.choices, self.choices.paper, self.library);
-        art::Options { dpi: Some(dpi.into()), ..settings.reading() }
+        art::Options { dpi: Some(self.choices.dpi.into()), ..settings.reading() }
     }
 
-    /// Where a page is printed. `drawn` is the window around everything on it, none if it is blank. Notes why nothing is
-    /// printed.
+    /// The job of a page; empty if nothing is on it, with a note. `mirrored` turns it left to right.
     ///
     /// # Errors
-    /// A layout that does not hold.
-    pub(super) fn view(
+    /// Art that cannot be printed, a layout that does not hold.
+    pub fn page(
         &mut self,
         number: usize,
-        paper: Paper,
-        (size, dpi): ((usize, usize), u16),
-        drawn: Option<Window>,
+        laid: &Laid,
+        (size, dpi, drawn): Drawn,
         mirrored: bool,
-    ) -> Result<Option<View>, FilterError> {
-        self.pages = number;
-        if !is_chosen(&self.choices.pages, number) {
-            return Ok(None);
-        }
+        art: impl FnOnce(&str, &art::Options) -> Result<Artwork, Diagnosis>,
+    ) -> Result<Vec<u8>, FilterError> {
         let Some(drawn) = drawn else {
             self.observer.note(&format!("page {number} is blank; the page is skipped"));
-            return Ok(None);
+            return Ok(Vec::new());
+        };
+        let turn = laid.fit.turn;
+        let drawn = drawn.turned(size, turn);
+        let lying = (turn.sides(size), dpi, drawn);
+        let Some(corner) = self.corner(number, laid, lying, &laid.fit.to_string(), mirrored)? else {
+            return Ok(Vec::new());
+        };
+        let art = art(&format!("page {number}"), &self.options())
+            .map_err(|source| FilterError::Layers { page: number, source })?;
+        self.job(number, laid, &art.turned(turn), corner, mirrored)
+    }
+
+    /// Where the corner of a page goes, turned already, so that what is drawn on it lies at its place; none if all of
+    /// it lies on the margins. Says how it lies, in these words, and what is cut.
+    fn corner(
+        &mut self,
+        number: usize,
+        laid: &Laid,
+        (size, dpi, drawn): ((usize, usize), f64, Window),
+        words: &str,
+        mirrored: bool,
+    ) -> Result<Option<Position>, FilterError> {
+        let dots = |pixels: usize| Mm(25.4 * pixels as f64 / dpi).dots();
+        // A mirrored page is turned about its middle.
+        let left = if mirrored { size.0.saturating_sub(drawn.left + drawn.width) } else { drawn.left };
+        let (left, top) = (dots(left), dots(drawn.top));
+        let Point(x, y) = laid.fit.corner;
+        let position = match laid.place {
+            Place::Page => {
+                Position::FromEdge(Point(Mm::of_dots(x.dots() + left), Mm::of_dots(y.dots() + top)))
+            }
+            Place::Centre => Position::Centred,
+            Place::At(corner) => Position::FromEdge(corner),
         };
         let in_layout = |error: LayoutError| FilterError::Job { page: number, source: error.into() };
-        let layout = self.settings(paper, mirrored).page.layout;
-        match View::of(self.choices.place, &layout, (size, dpi), drawn).map_err(in_layout)? {
-            Ok(view) => Ok(Some(view)),
-            Err(beyond) => {
-                self.observer.note(&format!(
-                    "everything on page {number} lies on the margins, where the printer cannot print ({beyond}); the page is \
-                     skipped"
-                ));
-                self.in_margins.get_or_insert((number, beyond));
-                Ok(None)
-            }
+        let layout = Layout { position, ..self.settings(laid.paper, mirrored).page.layout };
+        let sides = (dots(drawn.width), dots(drawn.height));
+        let side = |dots: i64| usize::try_from(dots).unwrap_or(0);
+        let size = (side(sides.0), side(sides.1));
+        let ((x, y), beyond) = layout.placed(size).map_err(in_layout)?;
+        let (width, length) = (Mm::of_dots(sides.0).0, Mm::of_dots(sides.1).0);
+        if let Some(cut) = beyond
+            && (cut.left.max(cut.right) >= width || cut.top.max(cut.bottom) >= length)
+        {
+            self.observer.note(&format!(
+                "everything on page {number} lies on the margins, where the printer cannot print ({cut}); the page is skipped"
+            ));
+            self.in_margins.get_or_insert((number, cut));
+            return Ok(None);
         }
+        if !words.is_empty() {
+            self.say(number, words.into());
+        }
+        if let Some(cut) = beyond {
+            self.is_cut = true;
+            self.say(number, format!("{cut} lies on the margins, where the printer cannot print"));
+        }
+        Ok(Some(Position::FromPrintable(Point(Mm::of_dots(x - left), Mm::of_dots(y - top)))))
     }
 
     /// How a page is printed, in the middle of its paper.
@@ -102,41 +251,41 @@ impl Press<'_> {
         settings
     }
 
-    /// The job of a picture that has no page of its own: in the middle of the sheet, as large as it says or as fits.
+    /// The job of a picture that has no page of its own.
     pub(super) fn picture(&mut self, path: &Path) -> Result<Vec<u8>, FilterError> {
-        self.pages = 1;
-        if !is_chosen(&self.choices.pages, 1) {
+        if !self.wants(1) {
             return Ok(Vec::new());
         }
-        let layout = Layout { cut: true, ..Layout::centred(self.choices.paper) };
-        let (width, length) = layout.largest();
-        let room = Room { width, length, cut: true };
-        let options = art::Options { dpi: None, room, ..self.options(self.choices.dpi) };
-        let art = art::open(&[path.to_path_buf()], &options, self.observer)
-            .map_err(|source| FilterError::Layers { page: 1, source: source.calling_it("this document") })?;
-        let position = match self.choices.place {
-            Place::At(corner) => Position::FromEdge(corner),
-            Place::Page | Place::Centre => Position::Centred,
-        };
-        let laid = self.settings(self.choices.paper, self.choices.mirror).page.layout;
-        let layout = Layout { position, ..laid };
-        let placed = layout.placed((art.width, art.length));
-        let (_, beyond) = placed.map_err(|error| FilterError::Job { page: 1, source: error.into() })?;
-        let view = View { position, beyond };
-        self.job(1, self.choices.paper, &art, &view, self.choices.mirror)
+        let in_picture =
+            |source: Diagnosis| FilterError::Layers { page: 1, source: source.calling_it("this document") };
+        let (paths, paper) = ([path.to_path_buf()], self.choices.paper);
+        let options = art::Options { dpi: None, ..self.options() };
+        let wish = self.placed(self.choices.fit.unwrap_or_default());
+        let fitted = Fitted::of(&paths, &options, paper, &wish).map_err(|error| match error {
+            FittedError::Art(source) => in_picture(source),
+            FittedError::Fit(source) => FilterError::Fit { page: 1, source },
+        })?;
+        let art = art::open(&paths, &fitted.read, self.observer).map_err(in_picture)?;
+        let laid = Laid { paper, fit: fitted.fit, place: Place::Page };
+        let (whole, mirrored) = (Window::whole((art.width, art.length)), self.choices.mirror);
+        let lying = ((art.width, art.length), 600.0, whole);
+        match self.corner(1, &laid, lying, &fitted.to_string(), mirrored)? {
+            Some(corner) => self.job(1, &laid, &art, corner, mirrored),
+            None => Ok(Vec::new()),
+        }
     }
 
-    /// The job of a page's art. `mirrored` turns it left to right.
-    pub(super) fn job(
+    /// The job of a page's art.
+    fn job(
         &mut self,
         number: usize,
-        paper: Paper,
+        laid: &Laid,
         art: &Artwork,
-        view: &View,
+        corner: Position,
         mirrored: bool,
     ) -> Result<Vec<u8>, FilterError> {
-        let mut settings = self.settings(paper, mirrored);
-        settings.page.layout.position = view.position;
+        let mut settings = self.settings(laid.paper, mirrored);
+        settings.page.layout.position = corner;
         let foil = art.layers.iter().map(|layer| layer.ink).find(|ink| ink.kind() == Kind::Foil);
         if let Some(ink) = foil.filter(|&ink| !settings.compose.inks.contains(ink)) {
             return Err(FilterError::Foil { page: number, ink });
@@ -154,10 +303,6 @@ impl Press<'_> {
             self.observer.note(&format!("page {number}: {}", suggestion.text));
         }
         let job = layers.job(self.observer).map_err(|error| unprintable(number, error))?;
-        if let Some(cut) = view.beyond {
-            self.observer
-                .note(&format!("page {number}: {cut} lies on the margins, where the printer cannot print"));
-        }
         Ok(job.bytes)
     }
 }
@@ -167,67 +312,5 @@ fn unprintable(page: usize, error: JobError) -> FilterError {
     match error {
         JobError::Refused { rule, text } if rule == CARTRIDGES => FilterError::Cartridges { page, text },
         source => FilterError::Job { page, source },
-    }
-}
-
-/// The paper of a page of so many pixels.
-pub(super) fn paper(
-    page: usize,
-    (width, height): (usize, usize),
-    dpi: u16,
-    choices: &Choices,
-) -> Result<Paper, FilterError> {
-    let mm = |pixels: usize| pixels as f64 * 25.4 / f64::from(dpi);
-    ppd::paper_of(mm(width), mm(height), choices.custom_paper).map_err(|problem| FilterError::Paper {
-        page,
-        width: mm(width),
-        length: mm(height),
-        problem,
-    })
-}
-
-/// Where a page is printed.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) struct View {
-    position: Position,
-    /// What of its art is left out on the margins.
-    beyond: Option<Cut>,
-}
-
-impl View {
-    /// Where the whole page lies if what is drawn on it lies at its place. `layout` is of its paper.
-    ///
-    /// # Errors
-    /// A layout that does not hold; in it, how far everything lies beyond what can be printed.
-    fn of(
-        place: Place,
-        layout: &Layout,
-        (size, dpi): ((usize, usize), u16),
-        drawn: Window,
-    ) -> Result<Result<View, Cut>, LayoutError> {
-        let dots = |pixels: usize| pixels * 600 / usize::from(dpi);
-        let mm = |dots: usize| Mm::of_dots(dots as i64);
-        // A mirrored page is turned about its middle.
-        let left = match layout.mirror {
-            true => size.0.saturating_sub(drawn.left + drawn.width),
-            false => drawn.left,
-        };
-        let (left, top) = (dots(left), dots(drawn.top));
-        let position = match place {
-            Place::Page => Position::FromEdge(Point(mm(left), mm(top))),
-            Place::Centre => Position::Centred,
-            Place::At(corner) => Position::FromEdge(corner),
-        };
-        let (width, length) = (dots(drawn.width), dots(drawn.height));
-        let ((x, y), beyond) = Layout { position, ..layout.clone() }.placed((width, length))?;
-        let corner = Point(Mm::of_dots(x - left as i64), Mm::of_dots(y - top as i64));
-        Ok(match beyond {
-            Some(cut)
-                if cut.left.max(cut.right) >= mm(width).0 || cut.top.max(cut.bottom) >= mm(length).0 =>
-            {
-                Err(cut)
-            }
-            beyond => Ok(View { position: Position::FromPrintable(corner), beyond }),
-        })
     }
 }

@@ -216,7 +216,7 @@ impl<W: std::io::Write> Visit<W> {
                     continue;
                 }
             };
-            let Running { desk, listens, printers, announced } = &running;
+            let Running { desk, listens, printers, announced, code } = &running;
             let who = running.who();
             // Where it listens on all addresses, this computer is one of them.
             let ip = match listens.ip() {
@@ -228,7 +228,7 @@ impl<W: std::io::Write> Visit<W> {
             writeln!(
                 self.out,
                 "\nprint server at {desk}\n    printers: {}\n    may print: {who}\n    in print dialogs: {announced}\n    \
-                 encrypted: with the certificate {}",
+                 code for changes from other devices: {code}\n    encrypted: with the certificate {}",
                 printers.join(" "),
                 folder.join("certificate.pem").display(),
             )?;

@@ -6,6 +6,7 @@ use anyhow::Result;
 use clap::Args as ClapArgs;
 use inks::{InkSet, InkSetError, Library};
 use make::PageSettings;
+use make::fitted::Fitted;
 use make::layers::{Layers, Settings};
 use make::options::{COLOUR, FINISH, GAMMA, INKS, INTENT, SPOTS, TOLERANCE, WHITE};
 #[cfg(feature = "serve")]
@@ -28,7 +29,8 @@ use crate::cli::printing::{self, Places, ResultArgs};
 use art::{Accept, Composed, Finish, GAMMAS, Intent, MOST_CHOKE_MM, Order, Pages, TOLERANCES, White, names};
 use observe::Observer;
 use press::job::plan::grouped;
-use press::layout::{Layout, Mm, NoLength};
+use press::layout::fit::{Scaling, Wish};
+use press::layout::{Layout, Mm, NoLength, Position};
 use readers::resolution::RESOLUTIONS;
 use sheet::DOTS_PER_MM;
 use sheet::Size;
@@ -306,6 +308,11 @@ pub struct Work {
     /// and as large as the page allows for a plain picture]
     #[arg(long)]
     size: Option<Size>,
+    /// Lay one page, picture or drawing on the sheet as print servers do: turned if it fits larger so, in the
+    /// middle, and as large as this says; --at moves its corner
+    #[arg(long, value_name = "HOW", value_parser = choice::<Scaling>())]
+    #[arg(conflicts_with_all = ["size", "repeat", "resolution"])]
+    fit: Option<Scaling>,
     /// Resolution of the print across the sheet: 600, or 1200 for art in cyan, magenta, yellow and black
     /// only
     ///
@@ -340,6 +347,7 @@ pub struct Work {
     foilpress layers decal.pdf --page 1 --white alpha\n  \
     foilpress layers plates.pdf --pages white,gold,black    (one page per ink)\n  \
     foilpress layers photo.png --size 120mm --to serial:/dev/ttyACM0\n  \
+    foilpress layers photo.png --fit auto --paper postcard  (turned, as large as fits)\n  \
     foilpress plan layers white.png gold.png black.png      (only the plan; nothing is written or sent)\n\n\
     In a layer, dark pixels are ink; on a transparent background, everything drawn is ink. Artwork drawn at 600 dpi is \
     printed dot for dot."
@@ -374,7 +382,6 @@ impl Args {
     /// The same choices as a print dialog makes them, for documents that come from elsewhere.
     #[cfg(feature = "serve")]
     pub fn choices(&self, observer: &dyn Observer) -> Result<Choices> {
-        use press::layout::Position;
         let Work { layers, layout, media, .. } = &self.work;
         let (settings, layout, handling) = (layers.settings()?, layout.layout(observer)?, media.handling());
         let process = InkSet::of([Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black]);
@@ -396,6 +403,7 @@ impl Args {
                 Position::FromEdge(corner) => Place::At(corner),
                 Position::FromPrintable(_) | Position::Centred => Place::Page,
             },
+            fit: self.work.wish(&layout),
             mirror: layout.mirror,
             custom_paper: false,
             profile: layout.profile,
@@ -407,6 +415,12 @@ impl Args {
 }
 
 impl Work {
+    /// How the art is laid on the sheet, if that was asked for.
+    fn wish(&self, layout: &Layout) -> Option<Wish> {
+        let corner = if let Position::FromEdge(corner) = layout.position { Some(corner) } else { None };
+        Some(Wish { scaling: self.fit?, corner, ..Wish::default() })
+    }
+
     /// Reads the art, composes it, and hands what is to be printed to `then`. `page` makes the page of a
     /// layout.
     fn with<T>(
@@ -418,13 +432,22 @@ impl Work {
         let library = self.layers.library()?;
         let layout = Layout { resolution: self.resolution, ..self.layout.layout(observer)? };
         let lines = self.cut_lines.as_deref().map(Staged::file).transpose()?;
-        let settings = Settings {
+        let mut settings = Settings {
             read: self.layers.options(self.size, lines.is_some())?,
             compose: self.layers.settings()?,
             library,
             page: page(layout),
             how: advice::options_of,
         };
+        if let Some(wish) = self.wish(&settings.page.layout) {
+            let paper = settings.page.layout.paper;
+            let fitted = Fitted::of(&self.layers.art, &settings.read, paper, &wish)?;
+            settings = fitted.settings(settings);
+            Some(fitted.to_string())
+                .filter(|said| !said.is_empty())
+                .iter()
+                .for_each(|said| observer.note(said));
+        }
         let art = Layers::open(&self.layers.art, &settings, observer)?;
         let lines = match (lines, &self.cut_lines) {
             (Some(staged), Some(to)) => Some((staged, cut_lines::drawing(&art, &settings.page.layout, to)?)),
@@ -533,7 +556,9 @@ mod tests {
             for (attribute, word) in value.attributes {
                 let mut ticket = Ticket::default();
                 assert!(ticket.ask(attribute, word), "{attribute}={word}");
-                assert_eq!(ticket.choices(&bare), wish(&bare), "{attribute}={word}");
+                // A server's sheet is given.
+                let asked = Choices { fit: None, ..ticket.choices(&bare) };
+                assert_eq!(asked, wish(&bare), "{attribute}={word}");
                 doors[2] += 1;
             }
         }
@@ -556,6 +581,25 @@ mod tests {
             let both = (typed.spots == picked.spots, keyword == "FoilpressTolerance");
             assert!(both != (false, false), "{words:?}");
             assert_eq!(of(typed), of(picked), "{words:?}");
+        }
+    }
+
+    #[test]
+    fn a_picture_is_laid_as_a_print_server_lays_it_byte_for_byte() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("photo.png");
+        let picture = readers::Pixels::from_fn(90, 60, |x, y| [(2 * x) as u8, 90, (4 * y) as u8]);
+        std::fs::write(&path, picture.png().unwrap()).unwrap();
+        for how in ["auto", "fill"] {
+            let typed = ["layers", path.to_str().unwrap(), "--fit", how, "--paper", "postcard"];
+            let Args { work, .. } = Command::parse_from(typed).args;
+            let page = |layout| PageSettings { layout, ..PageSettings::default() };
+            let laid = work.with(page, &Silent, |_, layers| Ok(layers.made(&Silent)?.job.bytes)).unwrap();
+            let choices = Command::parse_from(typed).args.choices(&Silent).unwrap();
+            let (mut served, library) = (Vec::new(), Library::builtin());
+            let file = std::fs::File::open(&path).unwrap();
+            queue::filter::run(file, Some(&path), &choices, &library, &mut served, &Silent).unwrap();
+            assert!(laid == served, "{how}");
         }
     }
 }

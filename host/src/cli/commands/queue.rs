@@ -347,5 +347,6 @@ fn filtered(arguments: &[OsString], observer: &dyn Observer) -> Result<usize> {
             filter::run(document, Some(path), &choices, &library, &mut out, observer)?
         }
         None => filter::run(io::stdin(), None, &choices, &library, &mut out, observer)?,
-    })
+    }
+    .jobs)
 }

@@ -63,6 +63,8 @@ pub struct Running {
     pub printers: Vec<String>,
     /// Whether print dialogs of other computers find it, in words.
     pub announced: String,
+    /// What other devices have to know to change things.
+    pub code: String,
 }
 
 impl Running {
@@ -138,10 +140,6 @@ mod with_server {
 
     /// The printer that is always there.
     const STANDARD: &str = "standard";
-    /// Letters of a code, without those that look alike.
-    const LETTERS: &[u8; 32] = b"abcdefghijkmnpqrstuvwxyz23456789";
-    /// Letters of a code: 2^40 of them are not tried out over a network.
-    const CODE: usize = 8;
 
     /// What the server says, at the terminal.
     struct Terminal;
@@ -184,7 +182,6 @@ mod with_server {
             library: crate::libraries::given(args.library.as_deref())?,
             devices: Printers::of_system()?,
             hosts: hosts(),
-            code: code()?,
         };
         let host = match address.ip().is_unspecified() {
             true => settings.hosts.first().map_or("localhost", String::as_str).to_owned(),
@@ -199,10 +196,10 @@ mod with_server {
         text.push_str(&format!(
             "http://{host}:{port}/  the desk: jobs, the loaded sheet, printing from a browser\n"
         ));
-        if !address.ip().is_loopback() {
-            text.push_str(&format!("code for changes from other devices: {}\n", settings.code));
-        }
         let server = Arc::new(Server::begin(settings, Box::new(Terminal))?);
+        if !address.ip().is_loopback() {
+            text.push_str(&format!("code for changes from other devices: {}\n", server.code()));
+        }
         let (advert, announced) = announce(&server, address);
         if !address.ip().is_loopback() {
             text.push_str(&format!("in print dialogs: {announced}\n"));
@@ -213,6 +210,7 @@ mod with_server {
             listens: address,
             printers: server.settings.printers.iter().map(printer).collect(),
             announced,
+            code: server.code(),
         };
         let told = server.settings.folder.join(RUNNING);
         durable::write(&told, &serde_json::to_vec(&running)?, Access::Private)
@@ -329,11 +327,5 @@ mod with_server {
         let Some(name) = name else { return Vec::new() };
         let short = name.split('.').next().unwrap_or(&name).to_owned();
         vec![format!("{short}.local"), name, short]
-    }
-
-    fn code() -> Result<String> {
-        let mut bytes = [0; CODE];
-        serve::random(&mut bytes)?;
-        Ok(bytes.iter().map(|byte| char::from(LETTERS[usize::from(byte % 32)])).collect())
     }
 }

@@ -203,7 +203,7 @@ fn three_ways_to_print_a_document_make_the_same_job() {
     ] {
         // A page of whole dots, printed where it has its drawing.
         fs::write(bench.path(name), document((288, 432), "", &[drawing])).unwrap();
-        bench.done(&format!("layers {name} {options} --at 0x0mm --crop -q -o {name}.print"));
+        bench.done(&format!("layers {name} {options} --fit auto -q -o {name}.print"));
         let layers = fs::read(bench.path(&format!("{name}.print/job.rgl"))).unwrap();
 
         let dialog = "FoilpressWhite=Under FoilpressCurl=Off";
@@ -212,7 +212,10 @@ fn three_ways_to_print_a_document_make_the_same_job() {
         assert!(filter.status.success(), "{}", String::from_utf8_lossy(&filter.stderr));
 
         let serving = Serving::start(&bench, &format!("file:{name}.sheets"));
-        let job = ipp::print(serving.address, "placed", name, &fs::read(bench.path(name)).unwrap()).unwrap();
+        let to = serving.address;
+        let load = "POST /desk/load?size=custom_x_101.6x152.4mm&kind=auto";
+        assert_eq!(ipp::http(to, &format!("{load} HTTP/1.1\r\nHost: {to}\r\n"), b"").unwrap().0, 200);
+        let job = ipp::print(to, "placed", name, &fs::read(bench.path(name)).unwrap()).unwrap();
         assert_eq!(serving.wait_for(job), 9);
         serving.kill();
         let kept: Vec<_> = fs::read_dir(bench.path(&format!("{name}.sheets"))).unwrap().collect();

@@ -97,6 +97,21 @@ pub fn no_page(said: &str, number: Option<u32>) -> String {
     }
 }
 
+/// That a page has a size that no page has, if Ghostscript fails for that.
+#[must_use]
+pub fn impossible_size(why: &str) -> Option<String> {
+    let sides = why.split_once("/PageSize [")?.1.split_once(']')?.0;
+    let mm: Vec<f64> = sides
+        .split_whitespace()
+        .map(|side| side.parse::<f64>().ok().map(|points| points * 25.4 / 72.0))
+        .collect::<Option<_>>()?;
+    let [width, length] = mm[..] else { return None };
+    Some(format!(
+        "a page of it is {width:.1} x {length:.1} mm, which cannot be drawn; give it a size such as \
+         210 x 297 mm"
+    ))
+}
+
 /// How many pages a document has that has not the page that was asked for.
 fn pages(said: &str) -> Option<u32> {
     said.split_once(BEYOND)?.1.lines().next()?.rsplit(' ').next()?.parse().ok()
@@ -276,6 +291,16 @@ pub(super) fn is_pdf(path: &Path) -> io::Result<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_page_of_no_size_is_told_with_its_size() {
+        let why = "Error: /undefined in --runpdf--; information: [/PageSize [2834645.75 720]]; stack:";
+        let said = impossible_size(why).unwrap();
+        assert!(said.starts_with("a page of it is 1000000.0 x 254.0 mm, which cannot be drawn"), "{said}");
+        for other in ["", "[/PageSize [", "/PageSize [1]", "/PageSize [a b]"] {
+            assert_eq!(impossible_size(other), None, "{other}");
+        }
+    }
 
     #[test]
     fn each_reason_has_words_of_its_own() {

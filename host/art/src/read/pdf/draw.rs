@@ -82,7 +82,7 @@ pub(super) fn picture(
     folder: &Scratch,
 ) -> Result<PathBuf, Diagnosis> {
     let picture = folder.path().join("page.png");
-    let options = [pages(page), cropped(path, Part::CropBox)?].concat();
+    let options = [pages((page, page)), cropped(path, Part::CropBox)?].concat();
     ghostscript((path, interpreter), &options, "pngalpha", dpi, &picture, || false)?;
     Ok(picture)
 }
@@ -111,9 +111,9 @@ pub(super) fn drafts(
     Ok((usual, Interpreter::Usual))
 }
 
-/// The options for one page.
-pub(super) fn pages(page: u32) -> Vec<String> {
-    vec![format!("-dFirstPage={page}"), format!("-dLastPage={page}")]
+/// The options for these pages, from the first to the last.
+pub(super) fn pages((first, last): (u32, u32)) -> Vec<String> {
+    vec![format!("-dFirstPage={first}"), format!("-dLastPage={last}")]
 }
 
 /// The options for a part of a page; what they run stands at their end.
@@ -153,7 +153,7 @@ fn leaves(
     let to = if only.is_some() { place(1) } else { folder.path().join("draft%d.tif") };
     let options = [
         vec!["-sCompression=lzw".into(), SPOTS.into()],
-        only.map_or_else(Vec::new, pages),
+        only.map_or_else(Vec::new, |page| pages((page, page))),
         cropped(path, part)?,
     ]
     .concat();
@@ -249,7 +249,7 @@ pub(super) fn separate(
     overprints: bool,
 ) -> Result<String, Diagnosis> {
     let mut options =
-        [pages(page), cropped(path, part)?, vec!["-dPrintSpotCMYK".into(), SPOTS.into()]].concat();
+        [pages((page, page)), cropped(path, part)?, vec!["-dPrintSpotCMYK".into(), SPOTS.into()]].concat();
     if overprints {
         options.extend(["-c".into(), "true setoverprint".into()]);
     }
@@ -296,6 +296,9 @@ pub(super) fn failed(path: &Path, error: ProcessError) -> Diagnosis {
         ProcessError::Start(source) => io(path, "start a program to read it")(source),
         ProcessError::Io(source) => io(path, "wait for the program that reads it")(source),
         ProcessError::Failed(why) => {
+            if let Some(size) = complaint::impossible_size(&why) {
+                return wrong(path, size);
+            }
             let diagnosis = wrong(path, format!("cannot be read: {why}"));
             if path.to_str().is_none() && why.contains(NOT_FOUND) {
                 diagnosis.hint(

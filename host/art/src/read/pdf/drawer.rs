@@ -42,8 +42,8 @@ pub struct Drawing<'a> {
     pub path: &'a Path,
     /// What reads it.
     pub interpreter: Interpreter,
-    /// The only page that is wanted, from 1; `None` for all.
-    pub page: Option<u32>,
+    /// The first and the last page that are wanted, from 1; `None` for all.
+    pub pages: Option<(u32, u32)>,
     /// What of each page is drawn.
     pub part: Part,
     /// Pixels an inch, across and down.
@@ -82,7 +82,7 @@ impl Drawer {
 
     /// Begins one process with these options.
     fn with(drawing: &Drawing<'_>, more: &[&str]) -> Result<Drawer, DrawError> {
-        let &Drawing { path, interpreter, page, part, dpi, has_ground, .. } = drawing;
+        let &Drawing { path, interpreter, pages: wanted, part, dpi, has_ground, .. } = drawing;
         let scratch = Scratch::new().map_err(DrawError::Folder)?;
         conversion::write(scratch.path()).map_err(DrawError::Folder)?;
         let mut options = vec![
@@ -93,7 +93,7 @@ impl Drawer {
             "-dGraphicsAlphaBits=1".into(),
         ];
         options.extend(conversion::OPTIONS.iter().chain(more).map(|option| String::from(*option)));
-        options.extend(page.map_or_else(Vec::new, pages));
+        options.extend(wanted.map_or_else(Vec::new, pages));
         // What it runs stands last.
         options.extend(crop(path, part).map_err(DrawError::Folder)?);
         let mut command = ghostscript::command(path, interpreter, scratch.path(), options);
@@ -234,7 +234,7 @@ mod tests {
             let drawing = Drawing {
                 path: &path,
                 interpreter: Interpreter::Usual,
-                page: None,
+                pages: None,
                 part: Part::Sheet,
                 dpi: (72.0, 72.0),
                 overprints,

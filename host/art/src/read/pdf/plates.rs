@@ -25,7 +25,7 @@ use protocol::ink::{Ink, Kind};
 use rayon::prelude::*;
 
 use super::conversion;
-use super::draw::{PROCESS, Part, drafts, plates_beside, separate};
+use super::draw::{DRAFT, Leaf, PROCESS, Part, drafts, plates_beside, separate};
 use super::drawer::{Drawer, Drawing};
 use super::ghostscript::Interpreter;
 use super::objects::{self, overprinting, without};
@@ -102,35 +102,41 @@ pub(super) fn layers(
 
 /// What drafts tell of a whole document.
 pub struct Survey {
-    /// For each page the spot colours that are layers of ink and not blank. Empty for a document without
-    /// pages.
-    pub spots: Vec<Vec<String>>,
+    /// Its pages; none if only its gradients were looked at.
+    pub pages: Vec<Surveyed>,
     /// The interpreter that draws most of it.
     pub interpreter: Interpreter,
 }
 
-/// Looks at all pages of a document. Notes name the page of a spot colour that names no ink.
+/// What a draft tells of a page.
+pub struct Surveyed {
+    /// Its spot colours that are layers of ink and not blank.
+    pub spots: Vec<String>,
+    /// Its width and length in inches.
+    pub inches: (f64, f64),
+}
+
+/// Looks at this part of all pages of a document. Notes name the page of a spot colour that names no ink.
 ///
 /// # Errors
 /// A document that Ghostscript cannot read, no Ghostscript, or a name that resembles that of an ink.
-pub fn survey(path: &Path, observer: &dyn Observer) -> Result<Survey, Diagnosis> {
+pub fn survey(path: &Path, part: Part, observer: &dyn Observer) -> Result<Survey, Diagnosis> {
     let folder = Scratch::new().map_err(io(path, "make a folder for its plates"))?;
-    let (drafts, interpreter) = drafts(path, None, Part::Sheet, &folder)?;
+    let (drafts, interpreter) = drafts(path, None, part, &folder)?;
     let mut notes = Vec::new();
-    let spots = drafts
-        .leaves
-        .iter()
-        .map(|leaf| layers(path, &format_args!("page {}", leaf.number), &leaf.spots, &mut notes))
-        .collect::<Result<_, _>>()?;
+    let page = |leaf: &Leaf| {
+        let spots = layers(path, &format_args!("page {}", leaf.number), &leaf.spots, &mut notes)?;
+        Ok(Surveyed { spots, inches: (leaf.size.0 / DRAFT, leaf.size.1 / DRAFT) })
+    };
+    let pages = drafts.leaves.iter().map(page).collect::<Result<_, _>>()?;
     notes.iter().for_each(|note| observer.note(note));
-    Ok(Survey { spots, interpreter })
+    Ok(Survey { pages, interpreter })
 }
 
 /// A page as plates: one for each spot colour that is a layer of ink, and the process plates for the rest.
 pub struct Separated {
     /// Pixels across and down.
     pub size: (usize, usize),
-    dpi: f64,
     plates: Vec<(String, Named, Vec<u8>)>,
     /// What is printed beside the plates, with the kind of each pixel.
     rest: Option<Vec<u8>>,
@@ -148,20 +154,20 @@ struct White {
     above: Vec<Option<Above>>,
 }
 
-/// Separates a page at `dpi` pixels per inch into plates for the spot colours of [`survey`] and the process
-/// plates.
+/// Separates this part of a page, by its number from 1, at `dpi` pixels per inch into plates for the spot
+/// colours of [`survey`] and the process plates.
 ///
 /// # Errors
 /// As [`open`](crate::open()).
 pub fn separated(
     path: &Path,
     interpreter: Interpreter,
-    page: usize,
+    (page, part): (usize, Part),
     dpi: f64,
 ) -> Result<Separated, Diagnosis> {
     let page = u32::try_from(page).map_err(|_| wrong(path, format!("there is no page {page}")))?;
     let overprints = Suspected::of(path).map_err(io(path, "read it"))?.overprint;
-    separated_part((path, interpreter), page, Part::Sheet, ((dpi, dpi), overprints))
+    separated_part((path, interpreter), page, part, ((dpi, dpi), overprints))
 }
 
 /// The only page of a drawing, and its pixels across and down.
@@ -251,8 +257,8 @@ pub(super) fn separated_part(
     let mut rest = None;
     if process.iter().any(|(_, coverage)| coverage.par_iter().any(|&c| c > 0)) {
         // Like that of a page without spots, so that a spot changes nothing elsewhere.
-        let page = Some(page);
-        let drawing = Drawing { path: source, interpreter, page, part, dpi, overprints, has_ground: false };
+        let pages = Some((page, page));
+        let drawing = Drawing { path: source, interpreter, pages, part, dpi, overprints, has_ground: false };
         let (drawn, size) = drawn(path, &drawing)?;
         if size != (width as usize, height as usize) {
             return Err(wrong(path, "a page differs in size from its plates"));
@@ -265,7 +271,7 @@ pub(super) fn separated_part(
         rest = Some(pixels);
     }
     let size = (width as usize, height as usize);
-    Ok(Separated { size, dpi: dpi.0, plates, rest, cuts, white, notes })
+    Ok(Separated { size, plates, rest, cuts, white, notes })
 }
 
 /// Takes marks in the registration colour, which every plate has alike, off all plates that have nothing
@@ -486,13 +492,13 @@ impl Separated {
             .reduce(|all, window| all.join(&window))
     }
 
-    /// The page as art, a layer for each plate.
+    /// The page as art, a layer for each plate. It is printed at so many pixels an inch.
     ///
     /// # Errors
     /// A page of no dots, or of more than 65535 on a side.
-    pub fn art(self, name: &str, options: &Options) -> Result<Artwork, Diagnosis> {
+    pub fn art(self, name: &str, dpi: f64, options: &Options) -> Result<Artwork, Diagnosis> {
         let empty = || wrong(Path::new(name), "the page has no dots");
-        let dots = size::page_dots(self.size, self.dpi).ok_or_else(empty)?;
+        let dots = size::page_dots(self.size, dpi).ok_or_else(empty)?;
         Ok(self.art_of(name, dots, options))
     }
 
