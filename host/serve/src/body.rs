@@ -14,16 +14,16 @@ use hyper::{Response, StatusCode};
 use tokio::task::block_in_place;
 use tokio::time::timeout;
 
+use crate::budget::{Exceeded, Places};
 use crate::spool::{Kind, Packing, Spool, SpoolError};
 
 /// What clients may take.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
     /// Connections at once.
-    pub connections: usize,
-    /// Connections of one computer at once.
-    pub of_one: usize,
-    /// Time for the head of a request; also the longest rest between two requests.
+    pub connections: Places,
+    /// Time for the whole head of a request, from its first byte on, beside what its bytes take at
+    /// [`Limits::pace`]; also the longest rest between two requests.
     pub head: Duration,
     /// Time for each piece of a body.
     pub piece: Duration,
@@ -38,8 +38,7 @@ pub struct Limits {
 impl Default for Limits {
     fn default() -> Limits {
         Limits {
-            connections: 256,
-            of_one: 128,
+            connections: Places { all: 256, of_one: 32, for_new: 64 },
             head: Duration::from_secs(15),
             piece: Duration::from_secs(30),
             body: Duration::from_secs(60),
@@ -101,15 +100,16 @@ pub async fn piece(body: &mut Incoming, limits: &Limits) -> Result<Option<Bytes>
 #[derive(Clone, Copy, Debug)]
 pub struct Gone;
 
-/// A document on its way to disk.
+/// A document on its way to disk. `room` is told of its unpacked bytes so far, and says whether there is room
+/// for them.
 ///
 /// # Errors
 /// The client is too slow, or gone.
 pub async fn keep(
     body: &mut Incoming,
     first: &[u8],
-    folder: &std::path::Path,
-    packing: Packing,
+    (folder, packing): (&std::path::Path, Packing),
+    room: &(dyn Fn(u64) -> Result<(), Exceeded> + Sync),
     limits: &Limits,
 ) -> Result<Result<(std::path::PathBuf, Kind, u64), SpoolError>, Gone> {
     let start = Instant::now();
@@ -118,7 +118,13 @@ pub async fn keep(
         Err(error) => return Ok(Err(error)),
     };
     let mut came = first.len() as u64;
-    if let Err(error) = block_in_place(|| spool.take(first)) {
+    let take = |spool: &mut Spool, bytes: &[u8]| {
+        block_in_place(|| {
+            spool.take(bytes)?;
+            room(spool.length()).map_err(SpoolError::Share)
+        })
+    };
+    if let Err(error) = take(&mut spool, first) {
         return Ok(Err(error));
     }
     while let Some(bytes) = piece(body, limits).await? {
@@ -126,7 +132,7 @@ pub async fn keep(
         if start.elapsed() > limits.body + Duration::from_secs(came / limits.pace) {
             return Err(Gone);
         }
-        if let Err(error) = block_in_place(|| spool.take(&bytes)) {
+        if let Err(error) = take(&mut spool, &bytes) {
             return Ok(Err(error));
         }
     }

@@ -10,20 +10,21 @@ use std::fs;
 use std::io::Write as _;
 use std::net::IpAddr;
 use std::path::PathBuf;
-use std::sync::PoisonError;
 
 use bytes::Bytes;
 use http_body_util::Full;
 use hyper::body::Incoming;
-use hyper::{Response, StatusCode};
+use hyper::{Method, Response, StatusCode};
 use observe::{Silent, with_causes};
 use serde_json::{Value, json};
 
+use crate::access::{Asker, Permit, Route};
 use crate::body::{Gone, Limits, keep, plain, words};
+use crate::budget::{Client, Purpose};
 use crate::charts::{self, CHARTS};
 use crate::jobs::{Job, Owner, State};
 use crate::operations;
-use crate::server::{ChangeError, Data, Server};
+use crate::server::{ChangeError, Data, Server, key};
 use crate::spool::{Kind, Packing, Spool, SpoolError};
 use crate::template::{AUTO, Loaded, SHEETS, Ticket, keyword_of, size_of};
 use crate::worker;
@@ -34,87 +35,74 @@ use press::preview::inks::{Ground, sheet_in_inks};
 use press::simulate::{Setup, print};
 use protocol::ink::Ink;
 
-/// Who asks.
-pub struct Guest {
-    /// Where they are.
-    pub from: IpAddr,
-    /// Whether they may change what is not theirs.
-    pub may_change: bool,
-}
+/// The routes there are.
+const ROUTES: [(Method, &str, Route); 14] = [
+    (Method::GET, "/", Route::Page),
+    (Method::GET, "/desk.js", Route::Script),
+    (Method::GET, "/desk.css", Route::Style),
+    (Method::GET, "/icon.png", Route::Icon),
+    (Method::GET, "/desk.json", Route::State),
+    (Method::GET, "/desk/preview.png", Route::Preview),
+    (Method::POST, "/desk/print", Route::Upload),
+    (Method::POST, "/desk/chart", Route::Chart),
+    (Method::POST, "/desk/plan", Route::Plan),
+    (Method::POST, "/desk/release", Route::Release),
+    (Method::POST, "/desk/hold", Route::Hold),
+    (Method::POST, "/desk/cancel", Route::Cancel),
+    (Method::POST, "/desk/lay", Route::Lay),
+    (Method::POST, "/desk/load", Route::Load),
+];
 
-/// Answers whoever looks.
-pub fn get(server: &Server, path: &str, query: &str) -> Response<Full<Bytes>> {
-    match path {
-        "/" => plain(StatusCode::OK, "text/html; charset=utf-8", &include_bytes!("desk/desk.html")[..]),
-        "/desk.js" => {
-            plain(StatusCode::OK, "text/javascript; charset=utf-8", &include_bytes!("desk/desk.js")[..])
-        }
-        "/desk.css" => plain(StatusCode::OK, "text/css; charset=utf-8", &include_bytes!("desk/desk.css")[..]),
-        "/icon.png" => plain(StatusCode::OK, "image/png", icon()),
-        "/desk.json" => {
-            let about = describe(server);
-            plain(StatusCode::OK, "application/json", about.to_string())
-        }
-        "/desk/preview.png" => {
-            let job = number(query, "job").unwrap_or(0);
-            match fs::read(server.store.folder(job).join(PREVIEW)) {
-                Ok(picture) => plain(StatusCode::OK, "image/png", picture),
-                Err(_) => words(StatusCode::NOT_FOUND, "there is no preview of this job"),
-            }
-        }
-        _ => words(StatusCode::NOT_FOUND, "there is no such page"),
-    }
+/// What is asked for by this method at this path.
+pub fn route(method: &Method, path: &str) -> Option<Route> {
+    let method = if method == Method::HEAD { &Method::GET } else { method };
+    ROUTES.into_iter().find(|(by, at, _)| by == method && *at == path).map(|(.., route)| route)
 }
 
 /// The preview in a job's folder.
 const PREVIEW: &str = "preview.png";
 
-/// Does what is asked.
-pub async fn post(
-    server: &Server,
-    path: &str,
-    query: &str,
-    guest: &Guest,
-    mut body: Incoming,
-    limits: &Limits,
-) -> Response<Full<Bytes>> {
-    let job = number(query, "job");
-    let done = match (path, guest.may_change) {
-        ("/desk/print", _) => return upload(server, query, guest.from, &mut body, limits).await,
-        ("/desk/chart", _) => {
-            return tokio::task::block_in_place(|| match chart(server, query, guest.from) {
-                Ok(id) => plain(StatusCode::OK, "application/json", json!({ "job": id }).to_string()),
-                Err(why) => words(StatusCode::UNPROCESSABLE_ENTITY, &why),
-            });
+/// Does what is asked, and shows what there is to see.
+pub fn act(server: &Server, permit: &Permit<Route>, query: &str, asker: &Asker) -> Response<Full<Bytes>> {
+    let job = permit.job();
+    let file = |kind: &'static str, bytes: &'static [u8]| plain(StatusCode::OK, kind, bytes);
+    let told = |done: Result<Value, String>| match done {
+        Ok(value) => plain(StatusCode::OK, "application/json", value.to_string()),
+        Err(why) => words(StatusCode::UNPROCESSABLE_ENTITY, &why),
+    };
+    let done = match permit.asked() {
+        Route::Page => return file("text/html; charset=utf-8", include_bytes!("desk/desk.html")),
+        Route::Script => return file("text/javascript; charset=utf-8", include_bytes!("desk/desk.js")),
+        Route::Style => return file("text/css; charset=utf-8", include_bytes!("desk/desk.css")),
+        Route::Icon => return plain(StatusCode::OK, "image/png", icon()),
+        Route::State => return told(Ok(describe(server, asker))),
+        Route::Preview => {
+            return match fs::read(server.store.folder(job).join(PREVIEW)) {
+                Ok(picture) => plain(StatusCode::OK, "image/png", picture),
+                Err(_) => words(StatusCode::NOT_FOUND, "there is no preview of this job"),
+            };
         }
-        ("/desk/plan", _) => {
-            return tokio::task::block_in_place(|| match plan(server, job.unwrap_or(0)) {
-                Ok(plan) => plain(StatusCode::OK, "application/json", plan.to_string()),
-                Err(why) => words(StatusCode::UNPROCESSABLE_ENTITY, &why),
-            });
+        Route::Chart => return told(chart(server, query, asker.from)),
+        Route::Plan => {
+            let Some(_looks) = server.looks(Client::at(asker.from)) else {
+                return words(
+                    StatusCode::TOO_MANY_REQUESTS,
+                    "another plan of yours is being drawn; wait for it",
+                );
+            };
+            return told(plan(server, job));
         }
-        ("/desk/cancel" | "/desk/hold" | "/desk/release" | "/desk/load" | "/desk/identify", false) => {
-            // Whoever guesses is slow.
-            tokio::time::sleep(std::time::Duration::from_secs(1)).await;
-            return words(
-                StatusCode::UNAUTHORIZED,
-                "type the code that `foilpress serve` shows in its terminal",
-            );
+        // It comes with its body, which `upload` reads.
+        Route::Upload => return words(StatusCode::BAD_REQUEST, "the request has no document"),
+        Route::Load => {
+            let size = parameter(query, "size").as_deref().and_then(size_of).ok_or(ChangeError::Sheet);
+            let kind = parameter(query, "kind").unwrap_or_else(|| AUTO.into());
+            size.and_then(|size| server.load(Loaded { size, kind }))
         }
-        ("/desk/load", true) => tokio::task::block_in_place(|| {
-            let size = parameter(query, "size").as_deref().and_then(size_of).ok_or(ChangeError::Sheet)?;
-            server.load(Loaded { size, kind: parameter(query, "kind").unwrap_or_else(|| AUTO.into()) })
-        }),
-        (path, true) => tokio::task::block_in_place(|| {
-            let id = job.ok_or(ChangeError::NoJob)?;
-            match path {
-                "/desk/cancel" => server.cancel(id),
-                "/desk/hold" => server.hold(id),
-                "/desk/release" => server.release(id),
-                _ => Err(ChangeError::NoJob),
-            }
-        }),
-        (_, false) => return words(StatusCode::NOT_FOUND, "there is no such thing to do"),
+        Route::Lay => server.lay_on_loaded(job),
+        Route::Cancel => server.cancel(job),
+        Route::Hold => server.hold(job),
+        Route::Release => server.release(job),
     };
     match done {
         Ok(()) => words(StatusCode::OK, "done"),
@@ -122,8 +110,19 @@ pub async fn post(
     }
 }
 
+/// The owner of what comes from the page at this address, with a new key.
+fn owner(from: IpAddr) -> Result<Owner, String> {
+    let key = key().map_err(|error| error.to_string())?;
+    Ok(Owner { user: "desk".into(), from: Some(from), key: Some(key) })
+}
+
+/// What a page is told of its new job.
+fn made(id: u32, owner: &Owner) -> Value {
+    json!({ "job": id, "key": owner.key })
+}
+
 /// A document from the page: a job that is held until somebody has seen its plan.
-async fn upload(
+pub async fn upload(
     server: &Server,
     query: &str,
     from: IpAddr,
@@ -134,20 +133,24 @@ async fn upload(
         return words(StatusCode::NOT_FOUND, "there is no such printer");
     };
     let name = parameter(query, "name").unwrap_or_else(|| "Untitled".into());
-    let owner = Owner { user: "desk".into(), from: Some(from) };
-    let created = || server.create(printer, &name, owner, waiting());
+    let owner = match owner(from) {
+        Ok(owner) => owner,
+        Err(why) => return words(StatusCode::SERVICE_UNAVAILABLE, &why),
+    };
+    let created = || server.create(printer, &name, owner.clone(), waiting());
     let id = match tokio::task::block_in_place(created) {
         Ok(id) => id,
         Err(error) => return words(StatusCode::SERVICE_UNAVAILABLE, &with_causes(&error)),
     };
     let _receives = server.receives(id);
-    let Ok(kept) = keep(body, &[], &server.store.folder(id), Packing::None, limits).await else {
+    let (folder, room) = (server.store.folder(id), |octets| server.reserve(id, octets));
+    let Ok(kept) = keep(body, &[], (&folder, Packing::None), &room, limits).await else {
         tokio::task::block_in_place(|| server.forget(id));
         let Gone = Gone;
         return words(StatusCode::REQUEST_TIMEOUT, "the document did not come in time");
     };
     tokio::task::block_in_place(|| match held(server, id, kept) {
-        Ok(()) => plain(StatusCode::OK, "application/json", json!({ "job": id }).to_string()),
+        Ok(()) => plain(StatusCode::OK, "application/json", made(id, &owner).to_string()),
         Err(why) => words(StatusCode::UNPROCESSABLE_ENTITY, &why),
     })
 }
@@ -171,13 +174,13 @@ fn held(server: &Server, id: u32, kept: Result<(PathBuf, Kind, u64), SpoolError>
 }
 
 /// A chart becomes a job that is held, as a document does.
-fn chart(server: &Server, query: &str, from: IpAddr) -> Result<u32, String> {
+fn chart(server: &Server, query: &str, from: IpAddr) -> Result<Value, String> {
     let printer =
         server.printer(&parameter(query, "printer").unwrap_or_default()).ok_or("there is no such printer")?;
     let name = parameter(query, "chart").unwrap_or_default();
     let ticket = waiting().on(server.data().loaded());
     let bytes = {
-        let _drawing = server.drawing.lock().unwrap_or_else(PoisonError::into_inner);
+        let _turn = server.drawing.take(Purpose::Look);
         let inks = {
             let data = server.data();
             let loaded = data.cartridges.iter().filter(|found| found.is_loaded);
@@ -187,13 +190,13 @@ fn chart(server: &Server, query: &str, from: IpAddr) -> Result<u32, String> {
         charts::job(&name, &choices, &inks, &server.settings.library, &Silent)
             .map_err(|error| error.to_string())?
     };
-    let owner = Owner { user: "desk".into(), from: Some(from) };
+    let owner = owner(from)?;
     let id = server
-        .create(printer, &format!("chart {name}"), owner, ticket)
+        .create(printer, &format!("chart {name}"), owner.clone(), ticket)
         .map_err(|error| with_causes(&error))?;
     let kept = Spool::begin(&server.store.folder(id), Packing::None, bytes.len() as u64)
         .and_then(|mut spool| spool.take(&bytes).and_then(|()| spool.end()));
-    held(server, id, kept).map(|()| id)
+    held(server, id, kept).map(|()| made(id, &owner))
 }
 
 /// What a held job would print: its passes and the ribbon they take, and a preview of its first sheet.
@@ -217,12 +220,13 @@ fn plan(server: &Server, id: u32) -> Result<Value, String> {
             json!({ "ink": pass.ink.name(), "dots": pass.plane.dots(), "ribbon_mm": ribbon_mm.round() })
         })
         .collect();
-    let (message, total) = {
+    let (note, total) = {
         let data = server.data();
         let job = data.jobs.get(&id).ok_or("there is no such job")?;
-        (job.message.clone(), job.sheets)
+        let note = if job.laid.is_empty() { job.message.clone() } else { job.laid.join("; ") };
+        (note, job.sheets)
     };
-    Ok(json!({ "job": id, "sheets": total, "passes": passes, "note": message }))
+    Ok(json!({ "job": id, "sheets": total, "passes": passes, "note": note }))
 }
 
 /// The value of a parameter in an address, without control characters.
@@ -243,12 +247,13 @@ fn parameter(query: &str, name: &str) -> Option<String> {
     Some(text)
 }
 
-fn number(query: &str, name: &str) -> Option<u32> {
+/// A parameter that is a number.
+pub fn number(query: &str, name: &str) -> Option<u32> {
     parameter(query, name)?.parse().ok()
 }
 
 /// Everything that the page shows.
-fn describe(server: &Server) -> Value {
+fn describe(server: &Server, asker: &Asker) -> Value {
     let data = server.data();
     let printers: Vec<Value> = server
         .settings
@@ -263,7 +268,7 @@ fn describe(server: &Server) -> Value {
         .map(|(keyword, label)| json!({ "keyword": keyword, "label": label }))
         .collect();
     let charts = CHARTS.map(|(name, label, look)| json!({ "name": name, "label": label, "look": look }));
-    let jobs: Vec<Value> = data.jobs.values().rev().take(50).map(|job| about(&data, job)).collect();
+    let jobs: Vec<Value> = data.jobs.values().rev().take(50).map(|job| about(&data, job, asker)).collect();
     let ribbons = Ledger::of(&server.settings.devices).lines().map_or_else(
         |_| Vec::new(),
         |(lines, _)| {
@@ -295,9 +300,10 @@ fn describe(server: &Server) -> Value {
     })
 }
 
-fn about(data: &Data, job: &Job) -> Value {
+fn about(data: &Data, job: &Job, asker: &Asker) -> Value {
     let (state, _) = operations::state(data, job);
     let words = match state {
+        3 if data.lacks_sheet(job) => "waits for its sheet",
         3 => "waits",
         4 if job.state == State::Incoming => "arrives",
         4 => "held",
@@ -316,10 +322,19 @@ fn about(data: &Data, job: &Job) -> Value {
         "state": words,
         "over": job.state.is_over(),
         "held": job.state == State::Held,
+        "mine": asker.is_keeper || asker.owns(&job.owner),
+        "lacks": data.lacks_sheet(job).then(|| sheet_of(data, job)),
         "message": job.message,
         "sheets": job.sheets,
         "done": job.done,
     })
+}
+
+/// The sheet that a job is for, as it is loaded.
+fn sheet_of(data: &Data, job: &Job) -> Value {
+    let loaded = data.loaded();
+    let size = job.ticket.size.unwrap_or(loaded.size);
+    json!({ "size": keyword_of(size), "kind": job.ticket.kind.as_ref().unwrap_or(&loaded.kind) })
 }
 
 /// A sheet with a leaf of foil on it, 128 x 128 pixels.

@@ -2,18 +2,17 @@
 //!
 //! Problem: a document may be a gigabyte, a client may be slow, hostile or many, and none of this may hinder another one. Method: hyper
 //! reads heads and hands on bodies piece by piece; a document goes to disk as it comes. Each connection has its time: for a head, for
-//! each piece, and for a document as a whole, which must come at a least pace. One computer has no more than its share of connections.
+//! each piece, and for a document as a whole, which must come at a least pace. A client has no more than its share ([`budget`](crate::budget)).
 //! What touches the disk runs where the runtime expects it to block.
 //! Cost: a task and two buffers of 64 KB a connection. Limits: see [`Limits`]; HTTP/1.1.
 //! Source: RFC 9110 and 9112; RFC 8010, section 4, for IPP over HTTP.
 
-use std::collections::HashMap;
 use std::convert::Infallible;
 use std::io;
-use std::net::{IpAddr, SocketAddr};
+use std::net::SocketAddr;
 use std::pin::Pin;
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use http_body_util::Full;
@@ -29,57 +28,31 @@ use tokio::task::block_in_place;
 use tokio::time::timeout;
 use tokio_rustls::TlsAcceptor;
 
-use crate::access::{self, Asked};
+use crate::access::{self, Asked, Asker, Refused, Route, Says};
 use crate::body::{Gone, Limits, drain, keep, piece, plain, words};
+use crate::budget::{Client, Connection, Connections};
 use crate::desk;
 use crate::operations;
 use crate::server::Server;
 use crate::tls::{self, HANDSHAKE};
-use crate::values::now;
 use crate::wire::{self, Place};
 
 /// The header in which a page says the code.
 const CODE: HeaderName = HeaderName::from_static("x-foilpress-code");
 
+/// The header in which a page shows the keys of what its browser has uploaded, separated by commas.
+const KEYS: HeaderName = HeaderName::from_static("x-foilpress-keys");
+/// The most of them.
+const MOST_KEYS: usize = 50;
+
+/// How long somebody waits who asked for what they may not: whoever guesses is slow.
+const REFUSED: Duration = Duration::from_secs(1);
+
+/// How long a job waits that somebody has put on the desk and nobody releases.
+const HELD: Duration = Duration::from_secs(24 * 60 * 60);
+
 /// Between two looks at jobs whose document does not come.
 const TICK: Duration = Duration::from_secs(5);
-
-/// Connections of each computer.
-#[derive(Default)]
-struct Guests(Mutex<HashMap<IpAddr, usize>>);
-
-/// A connection that counts while it is there.
-struct Guest {
-    guests: Arc<Guests>,
-    address: IpAddr,
-}
-
-impl Guests {
-    fn enter(self: &Arc<Self>, address: IpAddr, limits: &Limits) -> Option<Guest> {
-        let mut guests = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if guests.values().sum::<usize>() >= limits.connections {
-            return None;
-        }
-        let count = guests.entry(address).or_default();
-        if *count >= limits.of_one {
-            return None;
-        }
-        *count += 1;
-        Some(Guest { guests: self.clone(), address })
-    }
-}
-
-impl Drop for Guest {
-    fn drop(&mut self) {
-        let mut guests = self.guests.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(count) = guests.get_mut(&self.address) {
-            *count -= 1;
-            if *count == 0 {
-                guests.remove(&self.address);
-            }
-        }
-    }
-}
 
 /// Serves until the process ends.
 ///
@@ -90,7 +63,7 @@ pub fn run(server: &Arc<Server>, listeners: Vec<std::net::TcpListener>, limits: 
     // Documents are written to disk where they are read, so a few more threads than that needs.
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(4).enable_all().build()?;
     runtime.block_on(async {
-        let guests = Arc::new(Guests::default());
+        let guests = Arc::new(Connections::default());
         for listener in listeners {
             listener.set_nonblocking(true)?;
             let listener = TcpListener::from_std(listener)?;
@@ -100,7 +73,7 @@ pub fn run(server: &Arc<Server>, listeners: Vec<std::net::TcpListener>, limits: 
         loop {
             tokio::time::sleep(TICK).await;
             block_in_place(|| {
-                server.time_out(now().saturating_sub(crate::printer::TIME_OUT.unsigned_abs().into()))
+                server.time_out(Duration::from_secs(crate::printer::TIME_OUT.unsigned_abs().into()), HELD);
             });
         }
     })
@@ -114,12 +87,12 @@ struct House {
     limits: Limits,
 }
 
-async fn listen(house: House, listener: TcpListener, guests: Arc<Guests>) {
+async fn listen(house: House, listener: TcpListener, guests: Arc<Connections>) {
     loop {
         match listener.accept().await {
             Ok((stream, peer)) => {
                 // One too many is closed; the others go on.
-                if let Some(guest) = guests.enter(peer.ip().to_canonical(), &house.limits) {
+                if let Some(guest) = guests.enter(Client::at(peer.ip()), &house.limits.connections) {
                     tokio::spawn(connection(house.clone(), stream, peer, Arc::new(guest)));
                 }
             }
@@ -129,33 +102,42 @@ async fn listen(house: House, listener: TcpListener, guests: Arc<Guests>) {
     }
 }
 
-async fn connection(house: House, stream: TcpStream, peer: SocketAddr, guest: Arc<Guest>) {
+async fn connection(house: House, stream: TcpStream, peer: SocketAddr, guest: Arc<Connection>) {
     // Answers are small, and whoever waits for one should not wait longer.
     let _ = stream.set_nodelay(true);
     let mut first = [0];
     match timeout(house.limits.head, stream.peek(&mut first)).await {
         Ok(Ok(1)) if first[0] == HANDSHAKE => encrypted(house, stream, peer, guest).await,
-        Ok(Ok(1)) => spoken(house, stream, peer, guest, false).await,
+        Ok(Ok(1)) => spoken(house, stream, peer, guest, None).await,
         // Nothing came.
         _ => {}
     }
 }
 
-async fn encrypted<S>(house: House, stream: S, peer: SocketAddr, guest: Arc<Guest>)
+async fn encrypted<S>(house: House, stream: S, peer: SocketAddr, guest: Arc<Connection>)
 where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
+    let begun = Instant::now();
     if let Ok(Ok(stream)) = timeout(house.limits.head, house.acceptor.accept(stream)).await {
-        spoken(house, stream, peer, guest, true).await;
+        spoken(house, stream, peer, guest, Some(begun)).await;
     }
 }
 
-/// Requests on a connection, until it is closed or changes over to encryption.
-async fn spoken<S>(house: House, stream: S, peer: SocketAddr, guest: Arc<Guest>, is_encrypted: bool)
-where
+/// Requests on a connection, until it is closed or changes over to encryption, which began then.
+async fn spoken<S>(
+    house: House,
+    stream: S,
+    peer: SocketAddr,
+    guest: Arc<Connection>,
+    encrypted: Option<Instant>,
+) where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
-    let limits = house.limits;
+    let (limits, is_encrypted) = (house.limits, encrypted.is_some());
+    // What a handshake took is gone; one that takes long leaves little.
+    let spent = encrypted.map_or(Duration::ZERO, |begun| begun.elapsed());
+    let head = limits.head.saturating_sub(spent).max(Duration::from_millis(500));
     let service = service_fn(|mut request: Request<Incoming>| {
         let (house, guest) = (house.clone(), guest.clone());
         async move {
@@ -167,7 +149,7 @@ where
         }
     });
     let mut builder = hyper::server::conn::http1::Builder::new();
-    builder.timer(TokioTimer::new()).header_read_timeout(limits.head).max_buf_size(64 << 10);
+    builder.timer(TokioTimer::new()).header_read_timeout(head).max_buf_size(64 << 10);
     // What goes wrong here is the client's: it is gone.
     let _ = builder.serve_connection(TokioIo::new(stream), service).with_upgrades().await;
 }
@@ -194,13 +176,14 @@ fn change_over(
     house: House,
     upgrade: OnUpgrade,
     peer: SocketAddr,
-    guest: Arc<Guest>,
+    guest: Arc<Connection>,
 ) -> Pin<Box<dyn Future<Output = ()> + Send>> {
     Box::pin(changed_over(house, upgrade, peer, guest))
 }
 
 /// The connection behind a change to encryption. The request that asked for it is answered there first.
-async fn changed_over(house: House, upgrade: OnUpgrade, peer: SocketAddr, guest: Arc<Guest>) {
+async fn changed_over(house: House, upgrade: OnUpgrade, peer: SocketAddr, guest: Arc<Connection>) {
+    let begun = Instant::now();
     let Ok(Ok(stream)) = timeout(house.limits.head, upgrade).await else { return };
     let Ok(Ok(mut stream)) = timeout(house.limits.head, house.acceptor.accept(TokioIo::new(stream))).await
     else {
@@ -208,7 +191,7 @@ async fn changed_over(house: House, upgrade: OnUpgrade, peer: SocketAddr, guest:
     };
     let answer = b"HTTP/1.1 200 OK\r\nContent-Length: 0\r\nAllow: GET, HEAD, OPTIONS, POST\r\n\r\n";
     if stream.write_all(answer).await.is_ok() && stream.flush().await.is_ok() {
-        spoken(house, stream, peer, guest, true).await;
+        spoken(house, stream, peer, guest, Some(begun)).await;
     }
 }
 
@@ -225,29 +208,36 @@ async fn respond(
     if let Err(why) = access::check(&asked, &server.settings.hosts) {
         return words(StatusCode::FORBIDDEN, why);
     }
-    let may_change = access::may_change(&asked, &server.settings.code);
-    let host = host.unwrap_or_default().to_owned();
+    let is_keeper = access::is_keeper(&asked, &server.code());
+    let from = peer.ip().to_canonical();
     let path = request.uri().path().to_owned();
-    let kind = header(&CONTENT_TYPE).unwrap_or_default().to_owned();
-    match (request.method(), path.as_str()) {
-        (&Method::POST, path) if kind == "application/ipp" => {
-            let printer = path.trim_matches('/').strip_prefix("ipp/print").unwrap_or("");
-            let printer = printer.trim_matches('/').to_owned();
-            let from = peer.ip().to_canonical();
-            let place = Place { host, is_encrypted, printer, from, may_change };
-            ipp(server, request.into_body(), &place, limits).await
+    let is_ipp = request.method() == Method::POST && header(&CONTENT_TYPE) == Some("application/ipp");
+    if is_ipp {
+        let host = host.unwrap_or_default().to_owned();
+        let printer = path.trim_matches('/').strip_prefix("ipp/print").unwrap_or("");
+        let printer = printer.trim_matches('/').to_owned();
+        let place = Place { host, is_encrypted, printer, from, is_keeper };
+        return ipp(server, request.into_body(), &place, limits).await;
+    }
+    let keys = header(&KEYS).unwrap_or_default().split(',').map(|key| key.trim().to_owned());
+    let asker = Asker { from, is_keeper, says: Says::Keys(keys.take(MOST_KEYS).collect()) };
+    let Some(route) = desk::route(request.method(), &path) else {
+        return words(StatusCode::NOT_FOUND, "there is no such page");
+    };
+    let query = request.uri().query().unwrap_or_default().to_owned();
+    match server.permit(route, &asker, desk::number(&query, "job")) {
+        Err(refused) => {
+            tokio::time::sleep(REFUSED).await;
+            let status = match refused {
+                Refused::NoJob => StatusCode::NOT_FOUND,
+                Refused::Foreign | Refused::Code => StatusCode::UNAUTHORIZED,
+            };
+            words(status, &refused.to_string())
         }
-        (&Method::GET | &Method::HEAD, path) => {
-            let query = request.uri().query().unwrap_or_default();
-            block_in_place(|| desk::get(server, path, query))
+        Ok(_) if route == Route::Upload => {
+            desk::upload(server, &query, from, &mut request.into_body(), limits).await
         }
-        (&Method::POST, path) => {
-            let query = request.uri().query().unwrap_or_default().to_owned();
-            let path = path.to_owned();
-            let guest = desk::Guest { from: peer.ip().to_canonical(), may_change };
-            desk::post(server, &path, &query, &guest, request.into_body(), limits).await
-        }
-        _ => words(StatusCode::METHOD_NOT_ALLOWED, "there is no such thing to do"),
+        Ok(permit) => block_in_place(|| desk::act(server, &permit, &query, &asker)),
     }
 }
 
@@ -255,19 +245,20 @@ async fn respond(
 async fn ipp(server: &Server, mut body: Incoming, place: &Place, limits: &Limits) -> Response<Full<Bytes>> {
     const IPP: &str = "application/ipp";
     let late = || words(StatusCode::REQUEST_TIMEOUT, "the request did not come in time");
-    let mut bytes = Vec::new();
+    let (mut bytes, begun) = (Vec::new(), Instant::now());
     let end = loop {
         match wire::head(&bytes) {
             Ok(Some(end)) => break end,
             Ok(None) => {}
             Err(error) => return words(StatusCode::BAD_REQUEST, &error.to_string()),
         }
-        match piece(&mut body, limits).await {
-            Ok(Some(more)) => bytes.extend_from_slice(&more),
-            Ok(None) => {
+        let all = limits.head + Duration::from_secs(bytes.len() as u64 / limits.pace.max(1));
+        match timeout(all.saturating_sub(begun.elapsed()), piece(&mut body, limits)).await {
+            Ok(Ok(Some(more))) => bytes.extend_from_slice(&more),
+            Ok(Ok(None)) => {
                 return words(StatusCode::BAD_REQUEST, "the request ends in the middle of its attributes");
             }
-            Err(Gone) => return late(),
+            Ok(Err(Gone)) | Err(_) => return late(),
         }
     };
     let rest = bytes.split_off(end);
@@ -295,7 +286,9 @@ async fn ipp(server: &Server, mut body: Incoming, place: &Place, limits: &Limits
     };
     let folder = server.store.folder(incoming.job);
     let _receives = server.receives(incoming.job);
-    let Ok(spooled) = keep(&mut body, &rest, &folder, incoming.packing, limits).await else {
+    let room = |octets| server.reserve(incoming.job, octets);
+    let to = (folder.as_path(), incoming.packing);
+    let Ok(spooled) = keep(&mut body, &rest, to, &room, limits).await else {
         block_in_place(|| operations::gone(server, &incoming));
         return late();
     };

@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 use files::durable::{self, Access};
 use serde::{Deserialize, Serialize};
 
+use crate::budget::Client;
 use crate::template::Ticket;
 
 /// Ended jobs whose records stay.
@@ -58,6 +59,15 @@ pub struct Owner {
     pub user: String,
     /// Where they are.
     pub from: Option<IpAddr>,
+    /// What their browser got with what it uploaded, and shows again.
+    pub key: Option<String>,
+}
+
+impl Owner {
+    /// Who has a share of the server.
+    pub fn client(&self) -> Client {
+        self.from.map_or(Client::Here, Client::at)
+    }
 }
 
 /// A job.
@@ -95,6 +105,10 @@ pub struct Job {
     pub sheets: Option<u32>,
     /// Sheets that are printed.
     pub done: u32,
+    /// How its pages lie on their sheets, in words.
+    pub laid: Vec<String>,
+    /// Whether anything that is drawn was cut.
+    pub is_cut: bool,
 }
 
 impl Job {
@@ -243,7 +257,7 @@ mod tests {
             id,
             printer: "standard".into(),
             name: "leaf".into(),
-            owner: Owner { user: "me".into(), from: None },
+            owner: Owner { user: "me".into(), from: None, key: None },
             ticket: Ticket::default(),
             document: Some("document.pdf".into()),
             format: "application/pdf".into(),
@@ -256,6 +270,8 @@ mod tests {
             ended: None,
             sheets: None,
             done: 0,
+            laid: Vec::new(),
+            is_cut: false,
         }
     }
 

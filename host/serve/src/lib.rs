@@ -5,7 +5,8 @@
 //! browser ─────────────▶ [http] ─▶ [desk] ───────┘
 //! ```
 //! Each preset is a printer of its own, for dialogs show no vendor's options ([`template`]). What is drawn and how it is sent is what
-//! print queues do: this crate adds the protocol, jobs that outlive it, who may do what ([`access`]), and how dialogs find it ([`advert`]).
+//! print queues do: this crate adds the protocol, jobs that outlive it, who may do what ([`access`]) and how
+//! much of it ([`budget`]), and how dialogs find it ([`advert`]).
 //! Source: PWG 5100.14 (IPP Everywhere), RFC 8010 and 8011 (IPP), RFC 9110 and 9112 (HTTP).
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the standard mathematics"))]
 #![forbid(unsafe_code)]
@@ -14,6 +15,7 @@
 pub mod access;
 pub mod advert;
 pub mod body;
+pub mod budget;
 pub mod charts;
 pub mod desk;
 pub mod http;

@@ -2,27 +2,27 @@
 //!
 //! Method: a request that has a document is judged before the document is read ([`begin`]); when it is on disk the job is answered for
 //! ([`arrived`]). All others are answered at once ([`answer`]).
-//! A job is changed by its owner, who says the same name from the same address, or by whoever may change everything
-//! ([`may_change`](crate::access::may_change)).
-//! Limits: one document for a job. Name and address are no proof on a network where somebody takes both.
+//! Who may ask for what is one table ([`access`](crate::access)).
+//! Limits: one document for a job.
 //! Source: RFC 8011, section 4; PWG 5100.7, 5100.11 and 5100.14.
 
 mod about;
 
 use std::path::{Path, PathBuf};
 
-use ipp::model::{DelimiterTag, Operation, StatusCode};
+use ipp::model::{DelimiterTag, StatusCode};
 use ipp::value::IppValue;
 
 pub use self::about::state;
 use self::about::{TEMPLATE, Wanted, attributes};
+use crate::access::{Asker, Permit, Says, Who, who};
 use crate::jobs::{Job, Owner, State};
 use crate::printer;
 use crate::server::{ChangeError, Preset, Server};
 use crate::spool::{KINDS, Kind, Packing, SpoolError};
 use crate::template::Ticket;
-use crate::values::{each, keyword, now, read_text};
-use crate::wire::{OPERATIONS, Place, Request, Response};
+use crate::values::{each, keyword, read_text};
+use crate::wire::{Operation, Place, Request, Response};
 
 /// What is to be done with the document behind a request.
 pub struct Incoming {
@@ -38,6 +38,9 @@ pub struct Incoming {
     unsupported: Vec<(String, IppValue)>,
 }
 
+/// The longest words of somebody who wants to see the printer.
+const LONGEST_WORDS: usize = 80;
+
 fn status(request: &Request, status: StatusCode, words: &str) -> Response {
     Response::new(&request.header, status).saying(words)
 }
@@ -46,7 +49,7 @@ fn failed(request: &Request, error: &ChangeError) -> Response {
     let code = match error {
         ChangeError::NoJob => StatusCode::ClientErrorNotFound,
         ChangeError::State(_) => StatusCode::ClientErrorNotPossible,
-        ChangeError::Busy => StatusCode::ServerErrorBusy,
+        ChangeError::Share(_) => StatusCode::ServerErrorBusy,
         ChangeError::Sheet => StatusCode::ClientErrorAttributesOrValuesNotSupported,
         ChangeError::Store(_) | ChangeError::Disk(_) => StatusCode::ServerErrorInternalError,
     };
@@ -54,7 +57,7 @@ fn failed(request: &Request, error: &ChangeError) -> Response {
 }
 
 fn operation(request: &Request) -> Option<Operation> {
-    OPERATIONS.into_iter().find(|known| *known as i16 == request.header.operation_or_status)
+    Operation::of(request.header.operation_or_status)
 }
 
 /// Whether a request may have a document behind it.
@@ -114,24 +117,33 @@ fn job_of(server: &Server, place: &Place, request: &Request) -> Result<u32, Resp
     }
 }
 
-/// Whose jobs a request may be about as their owner's.
-fn owner(place: &Place, request: &Request) -> Owner {
+/// Who asks.
+fn asker(place: &Place, request: &Request) -> Asker {
     let named = request.operation("requesting-user-name").and_then(read_text);
-    Owner { user: named.unwrap_or_else(|| "anonymous".into()), from: Some(place.from) }
+    let says = Says::Name(named.unwrap_or_else(|| "anonymous".into()));
+    Asker { from: place.from, is_keeper: place.is_keeper, says }
 }
 
-/// The job that a request wants to change, which its owner may, and whoever may change everything.
-fn own_job(server: &Server, place: &Place, request: &Request) -> Result<u32, Response> {
-    let id = job_of(server, place, request)?;
-    let owner = owner(place, request);
-    match place.may_change || server.data().jobs.get(&id).is_some_and(|job| job.owner == owner) {
-        true => Ok(id),
-        false => Err(status(
-            request,
-            StatusCode::ClientErrorNotAuthorized,
-            "the job is somebody else's; its owner may change it, or the desk with the code of the server",
-        )),
-    }
+/// Whose job it is that a request makes.
+fn owner(place: &Place, request: &Request) -> Owner {
+    let Asker { from, says, .. } = asker(place, request);
+    let user = if let Says::Name(user) = says { user } else { String::new() };
+    Owner { user, from: Some(from), key: None }
+}
+
+/// Lets whoever asks do what they ask for.
+fn permitted(
+    server: &Server,
+    place: &Place,
+    request: &Request,
+    operation: Operation,
+) -> Result<Permit<Operation>, Response> {
+    let is_about_job = who(operation.into()) == Who::Owner || operation == Operation::GetJobAttributes;
+    let job = if is_about_job { Some(job_of(server, place, request)?) } else { None };
+    let asker = asker(place, request);
+    server
+        .permit(operation, &asker, job)
+        .map_err(|refused| status(request, StatusCode::ClientErrorNotAuthorized, &refused.to_string()))
 }
 
 /// A ticket, and what of the request is not possible.
@@ -143,6 +155,7 @@ fn ticket(request: &Request) -> Result<(Ticket, Vec<(String, IppValue)>), Respon
         }
     }
     let must = matches!(request.operation("ipp-attribute-fidelity"), Some(IppValue::Boolean(true)));
+    ticket.must_fit = must;
     if must && !unsupported.is_empty() {
         let code = StatusCode::ClientErrorAttributesOrValuesNotSupported;
         let mut response = status(request, code, "not every attribute is possible");
@@ -202,12 +215,13 @@ fn create(
 pub fn begin(server: &Server, place: &Place, request: &Request) -> Result<Incoming, Response> {
     let packing = document(request)?;
     if operation(request) == Some(Operation::PrintJob) {
+        permitted(server, place, request, Operation::PrintJob)?;
         let (printer, _) = target(server, place, request)?;
         let (ticket, unsupported) = ticket(request)?;
         let job = create(server, place, printer, request, ticket)?;
         return Ok(Incoming { job, packing, is_last: true, is_own: true, unsupported });
     }
-    let job = own_job(server, place, request)?;
+    let job = permitted(server, place, request, Operation::SendDocument)?.job();
     let is_last = match request.operation("last-document") {
         Some(IppValue::Boolean(last)) => *last,
         _ => {
@@ -251,6 +265,7 @@ pub fn arrived(
                 SpoolError::Packing => StatusCode::ClientErrorCompressionError,
                 SpoolError::Kind => StatusCode::ClientErrorDocumentFormatNotSupported,
                 SpoolError::Empty => StatusCode::ClientErrorBadRequest,
+                SpoolError::Share(_) => StatusCode::ServerErrorBusy,
                 SpoolError::Disk(_) => StatusCode::ServerErrorInternalError,
             };
             return status(request, code, &observe::with_causes(&error));
@@ -331,7 +346,12 @@ fn answered(server: &Server, place: &Place, request: &Request) -> Result<Respons
             "there is no such operation",
         ));
     };
-    match operation {
+    let permit = permitted(server, place, request, operation)?;
+    match permit.asked() {
+        // They have a document, and are answered when it is there.
+        Operation::PrintJob | Operation::SendDocument => {
+            Err(status(request, StatusCode::ClientErrorBadRequest, "the request has no document"))
+        }
         Operation::ValidateJob => {
             target(server, place, request)?;
             document(request)?;
@@ -362,7 +382,7 @@ fn answered(server: &Server, place: &Place, request: &Request) -> Result<Respons
         }
         Operation::GetJobs => get_jobs(server, place, request),
         Operation::GetJobAttributes => {
-            let id = job_of(server, place, request)?;
+            let id = permit.job();
             let wanted = Wanted::of(request, &["all"]);
             let uuid = server.uuid(&format!("job {id}"));
             let (mut response, data) = (ok(), server.data());
@@ -371,17 +391,17 @@ fn answered(server: &Server, place: &Place, request: &Request) -> Result<Respons
             }
             Ok(response)
         }
-        Operation::CancelJob => change(server.cancel(own_job(server, place, request)?)),
-        Operation::HoldJob => change(server.hold(own_job(server, place, request)?)),
-        Operation::ReleaseJob => change(server.release(own_job(server, place, request)?)),
+        Operation::CancelJob => change(server.cancel(permit.job())),
+        Operation::HoldJob => change(server.hold(permit.job())),
+        Operation::ReleaseJob => change(server.release(permit.job())),
         Operation::CloseJob => {
-            let id = own_job(server, place, request)?;
+            let id = permit.job();
             let is_open = server.data().jobs.get(&id).is_some_and(|job| job.state == State::Incoming);
             if is_open { change(server.arrived(id)) } else { Ok(ok()) }
         }
         Operation::CancelMyJobs | Operation::CancelJobs => {
             let (printer, _) = target(server, place, request)?;
-            let mine = owner(place, request);
+            let asker = asker(place, request);
             let asked: Option<Vec<u32>> = request.operation("job-ids").map(|ids| {
                 let number = |id: &IppValue| match id {
                     IppValue::Integer(id) => u32::try_from(*id).ok(),
@@ -389,11 +409,13 @@ fn answered(server: &Server, place: &Place, request: &Request) -> Result<Respons
                 };
                 each(ids).iter().filter_map(number).collect()
             });
-            let is_owner = |job: &Job| match place.may_change {
-                true => job.owner.user == mine.user,
-                false => job.owner == mine,
+            // This computer may be asked under any name of its user.
+            let owns = |job: &Job| match &asker.says {
+                Says::Name(user) if asker.is_keeper => job.owner.user == *user,
+                _ => asker.owns(&job.owner),
             };
-            let theirs = |job: &Job| job.printer == printer.name && is_owner(job);
+            let theirs =
+                |job: &Job| job.printer == printer.name && (operation == Operation::CancelJobs || owns(job));
             let jobs: Vec<u32> = {
                 let data = server.data();
                 if let Some(asked) = &asked
@@ -421,11 +443,16 @@ fn answered(server: &Server, place: &Place, request: &Request) -> Result<Respons
         Operation::IdentifyPrinter => {
             let (printer, _) = target(server, place, request)?;
             let words = request.operation("message").and_then(read_text).unwrap_or_default();
-            server.observer.note(&format!("somebody wants to see the printer {} {words}", printer.name));
-            server.data().identify = now();
-            Ok(ok())
+            match server.identify() {
+                true => {
+                    let words: String = words.chars().take(LONGEST_WORDS).collect();
+                    let said = format!("somebody wants to see the printer {} {words}", printer.name);
+                    server.observer.note(said.trim_end());
+                    Ok(ok())
+                }
+                false => Err(status(request, StatusCode::ServerErrorBusy, "it has just been shown")),
+            }
         }
-        _ => Err(status(request, StatusCode::ServerErrorOperationNotSupported, "there is no such operation")),
     }
 }
 

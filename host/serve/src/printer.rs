@@ -8,17 +8,19 @@
 
 use ipp::value::IppValue;
 
+use crate::budget::Client;
 use crate::server::{Cartridge, Preset, Server, identity};
 use crate::spool::KINDS;
 use crate::template::{
-    AUTO, MOST_COPIES, OVERRIDES, QUALITIES, RESOLUTIONS, SHEETS, Size, keyword_of, margins, paper, size,
-    sizes, supported,
+    AUTO, MOST_COPIES, NO_ORIENTATION, ORIENTATIONS, OVERRIDES, QUALITIES, RESOLUTIONS, SHEETS, Size,
+    keyword_of, margins, paper, size, sizes, supported,
 };
 use crate::values::{
     charset, collection, date_time, dpi, integer, keyword, keywords, language, list, long_text, mime, name,
     octets, range, text, unknown, uri,
 };
-use crate::wire::{OPERATIONS, Place};
+use crate::wire::{Operation, Place};
+use press::layout::fit::Scaling;
 use queue::messages::Reason;
 
 /// The type of printer in its names.
@@ -191,7 +193,7 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
         (
             D,
             "operations-supported",
-            list(OPERATIONS.iter().map(|&code| IppValue::Enum(i32::from(code as i16)))),
+            list(Operation::ALL.map(|operation| IppValue::Enum(operation.code().into()))),
         ),
         (D, "pages-per-minute", integer(1)),
         (D, "pages-per-minute-color", integer(1)),
@@ -213,7 +215,7 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
                 "type=sheetFeedAutoNonRemovableTray;mediafeed=0;mediaxfeed=0;maxcapacity=1;level=-2;status=0;name=main;",
             ),
         ),
-        (D, "printer-is-accepting-jobs", IppValue::Boolean(true)),
+        (D, "printer-is-accepting-jobs", IppValue::Boolean(server.accepts(&data, Client::at(place.from)))),
         (D, "printer-kind", keywords(["document", "photo"])),
         (D, "printer-location", text("")),
         (D, "printer-make-and-model", text(MODEL)),
@@ -321,8 +323,12 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
         (T, "multiple-document-handling-supported", keyword("separate-documents-uncollated-copies")),
         (T, "number-up-default", integer(1)),
         (T, "number-up-supported", integer(1)),
-        (T, "orientation-requested-default", IppValue::Enum(3)),
-        (T, "orientation-requested-supported", IppValue::Enum(3)),
+        (T, "orientation-requested-default", IppValue::Enum(NO_ORIENTATION)),
+        (
+            T,
+            "orientation-requested-supported",
+            list(ORIENTATIONS.map(|(orientation, _)| IppValue::Enum(orientation))),
+        ),
         (T, "output-bin-default", keyword("face-up")),
         (T, "output-bin-supported", keyword("face-up")),
         (T, "overrides-supported", keywords(OVERRIDES)),
@@ -336,7 +342,7 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
         (T, "print-rendering-intent-default", keyword(AUTO)),
         (T, "print-rendering-intent-supported", keywords(supported("print-rendering-intent"))),
         (T, "print-scaling-default", keyword(AUTO)),
-        (T, "print-scaling-supported", keyword(AUTO)),
+        (T, "print-scaling-supported", keywords(Scaling::ALL.map(Scaling::name))),
         (T, "printer-resolution-default", dpi(600)),
         (T, "printer-resolution-supported", list(RESOLUTIONS.map(dpi))),
         (T, "sides-default", keyword("one-sided")),

@@ -5,13 +5,16 @@
 
 mod data;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
+pub(crate) use self::data::key;
 pub use self::data::{Cartridge, Data, identities, identity};
 use self::data::{Kept, keep, kept};
+use crate::access::{Asker, Deed, Permit, Refused, permit};
+use crate::budget::{self, Client, Disk, Exceeded, Turns};
 use crate::jobs::{Job, Owner, State, Store, StoreError, after_restart};
 use crate::template::{Loaded, Ticket, paper, supported};
 use crate::values::now;
@@ -22,9 +25,6 @@ use inks::Library;
 use make::options::Choices;
 use observe::Observer;
 use queue::backend;
-
-/// The most jobs that wait.
-pub const MOST_JOBS: usize = 500;
 
 /// A printer: a preset under a name.
 #[derive(Clone, Debug)]
@@ -51,8 +51,6 @@ pub struct Settings {
     pub devices: Printers,
     /// The names under which this computer is asked for.
     pub hosts: Vec<String>,
-    /// What somebody elsewhere has to know to change things.
-    pub code: String,
 }
 
 impl Settings {
@@ -91,9 +89,9 @@ pub enum ChangeError {
     /// Its state does not allow it.
     #[error("the job is {0}")]
     State(&'static str),
-    /// The most jobs wait already.
-    #[error("{MOST_JOBS} jobs wait already; try again later")]
-    Busy,
+    /// Whoever asks has its share.
+    #[error(transparent)]
+    Share(#[from] Exceeded),
     /// No such sheet.
     #[error("the printer does not take such a sheet")]
     Sheet,
@@ -113,8 +111,9 @@ pub struct Server {
     pub store: Store,
     data: Mutex<Data>,
     wake: Condvar,
-    /// Held while a document is drawn: a page is 100 MB.
-    pub drawing: Mutex<()>,
+    /// Whose turn it is to draw.
+    pub drawing: Turns,
+    disk: Disk,
     /// When it began.
     pub started: Instant,
     /// Told what people at the terminal should know.
@@ -149,11 +148,16 @@ impl Server {
                 store.clear(job.id, false)?;
             }
         }
+        let disk = Disk::of_free(durable::free(&settings.folder));
         let kept = kept(&settings.folder).map_err(file(&settings.folder))?;
         let data = Data {
             next: jobs.keys().next_back().map_or(1, |last| last + 1),
+            takes_any_sheet: matches!(settings.to, Destination::File(_)),
             jobs,
             heard: BTreeMap::new(),
+            held: BTreeMap::new(),
+            arriving: BTreeMap::new(),
+            looking: BTreeSet::new(),
             reasons: Vec::new(),
             message: String::new(),
             percent: None,
@@ -162,13 +166,15 @@ impl Server {
             changed: now(),
             configured: now(),
             identify: 0,
+            identified: None,
         };
         Ok(Server {
             settings,
             store,
             data: Mutex::new(data),
             wake: Condvar::new(),
-            drawing: Mutex::new(()),
+            drawing: Turns::default(),
+            disk,
             started: Instant::now(),
             observer,
             _lock: lock,
@@ -186,6 +192,37 @@ impl Server {
             "" => self.settings.printers.first(),
             name => self.settings.printers.iter().find(|printer| printer.name == name),
         }
+    }
+
+    /// Lets somebody do something, perhaps to a job.
+    ///
+    /// # Errors
+    /// The table of rights says no.
+    pub fn permit<T: Into<Deed> + Copy>(
+        &self,
+        asked: T,
+        asker: &Asker,
+        job: Option<u32>,
+    ) -> Result<Permit<T>, Refused> {
+        let data = self.data();
+        let job = job.and_then(|id| Some((id, &data.jobs.get(&id)?.owner)));
+        permit(asked, asker, job)
+    }
+
+    /// What somebody elsewhere has to know to change things: the same after every start.
+    pub fn code(&self) -> String {
+        self.data().kept.code.clone()
+    }
+
+    /// Shows which printer this is; false if that was just done.
+    pub fn identify(&self) -> bool {
+        const AGAIN: Duration = Duration::from_secs(10);
+        let mut data = self.data();
+        let is_new = data.identified.is_none_or(|last| last.elapsed() >= AGAIN);
+        if is_new {
+            (data.identified, data.identify) = (Some(Instant::now()), now());
+        }
+        is_new
     }
 
     /// The identity of a printer, or of a job: the same after every start, and no other computer's.
@@ -215,9 +252,8 @@ impl Server {
         ticket: Ticket,
     ) -> Result<u32, ChangeError> {
         let mut data = self.data();
-        if data.open() >= MOST_JOBS {
-            return Err(ChangeError::Busy);
-        }
+        let client = owner.client();
+        budget::job(client, data.open(), data.open_of(client))?;
         let id = data.next;
         let job = Job {
             id,
@@ -236,6 +272,8 @@ impl Server {
             ended: None,
             sheets: None,
             done: 0,
+            laid: Vec::new(),
+            is_cut: false,
         };
         self.store.save(&job)?;
         data.next += 1;
@@ -266,12 +304,46 @@ impl Server {
         Ok(done)
     }
 
+    /// Whether another job of a client is taken.
+    pub fn accepts(&self, data: &Data, client: Client) -> bool {
+        let (own, all) = data.octets(client);
+        budget::job(client, data.open(), data.open_of(client)).is_ok()
+            && self.disk.holds(client, own + 1, all + 1).is_ok()
+    }
+
+    /// A job's document that is arriving has so many bytes now.
+    ///
+    /// # Errors
+    /// There is no room for them.
+    pub fn reserve(&self, id: u32, octets: u64) -> Result<(), Exceeded> {
+        let mut data = self.data();
+        data.arriving.insert(id, octets);
+        let client = data.jobs.get(&id).map_or(Client::Here, |job| job.owner.client());
+        let (own, all) = data.octets(client);
+        self.disk.holds(client, own, all)
+    }
+
+    /// Somebody looks at what would be printed, until what is given back is dropped; `None` if they do so
+    /// already.
+    pub fn looks(&self, client: Client) -> Option<impl Drop + use<'_>> {
+        struct Looks<'a>(&'a Server, Client);
+        impl Drop for Looks<'_> {
+            fn drop(&mut self) {
+                self.0.data().looking.remove(&self.1);
+            }
+        }
+        let is_first = self.data().looking.insert(client) || !client.is_limited();
+        is_first.then(|| Looks(self, client))
+    }
+
     /// A job's document comes, until what is given back is dropped. Time runs out between operations; each has limits of its own.
     pub fn receives(&self, id: u32) -> impl Drop + use<'_> {
         struct Receives<'a>(&'a Server, u32);
         impl Drop for Receives<'_> {
             fn drop(&mut self) {
-                self.0.data().heard.insert(self.1, Some(now()));
+                let mut data = self.0.data();
+                data.heard.insert(self.1, Some(Instant::now()));
+                data.arriving.remove(&self.1);
             }
         }
         self.data().heard.insert(id, None);
@@ -386,18 +458,40 @@ impl Server {
         let kept = Kept { loaded, ..data.kept.clone() };
         keep(&self.settings.folder.join("server.json"), &kept).map_err(ChangeError::Disk)?;
         (data.kept, data.configured, data.changed) = (kept, now(), now());
+        drop(data);
+        // A job may have waited for it.
+        self.wake.notify_all();
         Ok(())
     }
 
-    /// Waits for the next job to print; it is processing then. The bridge has one sheet at a time, so the job whose sheet is open there
-    /// goes before all others, and while it is held nobody goes.
+    /// A job that waits for another sheet is laid on the one that is loaded.
+    ///
+    /// # Errors
+    /// It does not wait, or it cannot be kept.
+    pub fn lay_on_loaded(&self, id: u32) -> Result<(), ChangeError> {
+        let loaded = self.data().loaded().clone();
+        self.change(id, |job| match job.state {
+            State::Pending | State::Held if !self.is_open(job) => {
+                (job.ticket.size, job.ticket.kind) = (Some(loaded.size), Some(loaded.kind));
+                // It is drawn again.
+                job.sheets = None;
+                Ok(())
+            }
+            _ => Err(ChangeError::State("not waiting")),
+        })
+    }
+
+    /// Waits for the next job to print; it is processing then. One for another sheet than the loaded one is
+    /// passed by others. The bridge has one sheet at a time, so the job whose sheet is open there goes before
+    /// all others, and while it is held nobody goes.
     pub fn next(&self) -> Job {
         let mut data = self.data();
         loop {
             let mut jobs = data.jobs.values();
             let open =
                 jobs.find(|job| matches!(job.state, State::Pending | State::Held) && self.is_open(job));
-            let first = || data.jobs.values().find(|job| job.state == State::Pending);
+            let can_print = |job: &&Job| job.state == State::Pending && !data.lacks_sheet(job);
+            let first = || data.jobs.values().find(can_print);
             let next = open.or_else(first).filter(|job| job.state == State::Pending).cloned();
             if let Some(mut job) = next {
                 job.state = State::Processing;
@@ -415,21 +509,34 @@ impl Server {
         }
     }
 
-    /// Ends jobs that have waited for their document since before this time, in seconds since 1970.
-    pub fn time_out(&self, since: u64) {
-        let late: Vec<u32> = {
+    /// Ends jobs that have waited so long for their document, and those that have lain so long on the desk
+    /// while the server ran.
+    pub fn time_out(&self, document: Duration, held: Duration) {
+        let now = Instant::now();
+        let is_late = |since: Instant, most: Duration| now.duration_since(since) >= most;
+        let (late, left): (Vec<u32>, Vec<u32>) = {
             let mut data = self.data();
-            let Data { jobs, heard, .. } = &mut *data;
+            let Data { jobs, heard, held: lying, .. } = &mut *data;
             heard.retain(|id, _| jobs.get(id).is_some_and(|job| job.state == State::Incoming));
-            let last = |job: &Job| heard.get(&job.id).copied().unwrap_or(Some(job.created));
-            let late = |job: &&Job| last(job).is_some_and(|last| last < since);
-            let incoming = jobs.values().filter(|job| job.state == State::Incoming);
-            incoming.filter(late).map(|job| job.id).collect()
+            let lies = |job: &Job| job.state == State::Held && job.ticket.held && job.owner.key.is_some();
+            lying.retain(|id, _| jobs.get(id).is_some_and(lies));
+            for job in jobs.values() {
+                if job.state == State::Incoming {
+                    heard.entry(job.id).or_insert(Some(now));
+                } else if lies(job) {
+                    lying.entry(job.id).or_insert(now);
+                }
+            }
+            let late = heard.iter().filter(|(_, last)| last.is_some_and(|last| is_late(last, document)));
+            let left = lying.iter().filter(|(_, since)| is_late(**since, held));
+            (late.map(|(id, _)| *id).collect(), left.map(|(id, _)| *id).collect())
         };
-        for id in late {
+        let ends = late.into_iter().map(|id| (id, "the document did not come in time"));
+        let ends = ends.chain(left.into_iter().map(|id| (id, "nobody printed it within a day")));
+        for (id, why) in ends {
             let ended = self.change(id, |job| {
-                (job.state, job.ended) = (State::Aborted, Some(now()));
-                job.message = "the document did not come in time".into();
+                (job.state, job.ended) = (State::Aborted, Some(crate::values::now()));
+                job.message = why.into();
                 Ok(())
             });
             // Tried again the next time.

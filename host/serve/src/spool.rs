@@ -9,6 +9,7 @@ use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use crate::budget::Exceeded;
 use files::durable;
 use flate2::write::{DeflateDecoder, GzDecoder, ZlibDecoder};
 
@@ -66,6 +67,9 @@ pub enum SpoolError {
     /// Nothing came.
     #[error("the document is empty")]
     Empty,
+    /// There is no room for it.
+    #[error(transparent)]
+    Share(Exceeded),
     /// The disk.
     #[error("the document cannot be kept")]
     Disk(#[source] io::Error),
@@ -163,15 +167,24 @@ impl Spool {
         written.map_err(|error| self.failed(&error))
     }
 
-    fn failed(&mut self, error: &io::Error) -> SpoolError {
-        let out = match &mut self.inflater {
+    /// Its file.
+    fn out(&mut self) -> Option<&mut Limited> {
+        match &mut self.inflater {
             Inflater::Plain(out) => Some(out),
             Inflater::Deflate(out, _) => out.as_mut(),
             Inflater::Raw(out) => Some(out.get_mut()),
             Inflater::Zlib(out) => Some(out.get_mut()),
             Inflater::Gzip(out) => Some(out.get_mut()),
-        };
-        match out.and_then(|out| out.failed.take()) {
+        }
+    }
+
+    /// Bytes that have come out so far.
+    pub fn length(&mut self) -> u64 {
+        self.out().map_or(0, |out| out.length)
+    }
+
+    fn failed(&mut self, error: &io::Error) -> SpoolError {
+        match self.out().and_then(|out| out.failed.take()) {
             Some(error) => SpoolError::Disk(error),
             None if error.kind() == io::ErrorKind::FileTooLarge => SpoolError::TooLarge,
             None => SpoolError::Packing,
@@ -193,13 +206,7 @@ impl Spool {
         if let Err(error) = finished {
             return Err(self.failed(&error));
         }
-        let out = match &mut self.inflater {
-            Inflater::Plain(out) => out,
-            Inflater::Raw(out) => out.get_mut(),
-            Inflater::Zlib(out) => out.get_mut(),
-            Inflater::Gzip(out) => out.get_mut(),
-            Inflater::Deflate(..) => return Err(SpoolError::Empty),
-        };
+        let out = self.out().ok_or(SpoolError::Empty)?;
         if out.length == 0 {
             return Err(SpoolError::Empty);
         }

@@ -3,7 +3,7 @@
 //! Problem: dialogs show size, type of sheet, quality, colour and copies, and nothing else; white, finish and spot colours are invisible
 //! to them. Method: those are a preset's, and each preset is a printer of its own; what dialogs show changes the preset's choices.
 //! A value that the table has no row for, such as `auto`, is the preset's own.
-//! Limits: a sheet has one side and no finishings, and is printed upright.
+//! Limits: a sheet has one side and no finishings.
 //! Source: RFC 8011, section 5.2; PWG 5100.3, 5100.7 and 5101.1.
 
 use std::ops::RangeInclusive;
@@ -14,8 +14,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::values::{each, read_text};
 use make::options::{Choices, of_attribute};
+use press::layout::fit::{Scaling, Wish};
 use press::layout::paper::{custom_margins, custom_range, sheet_mm, table};
 use queue::ppd::paper_of;
+use sheet::Turn;
 
 /// The sheets with a name, by the names of PWG 5101.1.
 pub const SHEETS: [(&str, Paper); 6] = [
@@ -52,14 +54,24 @@ pub const MOST_COPIES: i32 = 99;
 /// Resolutions of the drawing.
 pub const RESOLUTIONS: [u16; 2] = [300, 600];
 /// Attributes that have one possible value.
-const FIXED: [(&str, &str); 6] = [
+const FIXED: [(&str, &str); 5] = [
     ("sides", "one-sided"),
     ("output-bin", "face-up"),
     ("job-sheets", "none"),
     ("media-source", "main"),
     ("multiple-document-handling", "separate-documents-uncollated-copies"),
-    ("print-scaling", "auto"),
 ];
+
+/// `orientation-requested`, with the turns that it means; without one the page lies as it fits.
+pub const ORIENTATIONS: [(i32, Option<Turn>); 5] = [
+    (3, Some(Turn::None)),
+    (4, Some(Turn::Left)),
+    (5, Some(Turn::Right)),
+    (6, Some(Turn::Half)),
+    (NO_ORIENTATION, None),
+];
+/// The one that means none.
+pub const NO_ORIENTATION: i32 = 7;
 
 /// `overrides-supported`: what an override may name. What it would change is not among it, so it changes nothing.
 pub const OVERRIDES: [&str; 2] = ["document-number", "pages"];
@@ -124,6 +136,14 @@ pub fn keyword_of(sheet: Size) -> String {
     }
 }
 
+/// A sheet of this size, for people: its name, or its sides.
+pub fn label(sheet: Size) -> String {
+    match paper(sheet) {
+        Some(paper) if !matches!(paper, Paper::Custom { .. }) => paper.name().into(),
+        _ => format!("{} x {} mm", f64::from(sheet.0) / 100.0, f64::from(sheet.1) / 100.0),
+    }
+}
+
 /// The size that a keyword names: one of [`SHEETS`], or the size at its end, such as `na_index-4x6_4x6in`.
 pub fn size_of(keyword: &str) -> Option<Size> {
     if let Some((_, paper)) = SHEETS.iter().find(|(known, _)| *known == keyword) {
@@ -157,6 +177,12 @@ pub struct Ticket {
     pub intent: Option<String>,
     /// `print-color-mode`.
     pub colour: Option<String>,
+    /// `print-scaling`.
+    pub scaling: Option<Scaling>,
+    /// `orientation-requested`.
+    pub orientation: Option<i32>,
+    /// `ipp-attribute-fidelity`: whether a page smaller than the sheet is fitted, too.
+    pub must_fit: bool,
     /// Pages to print, from 1.
     pub pages: Vec<(i32, i32)>,
     /// Whether it waits until it is released.
@@ -173,6 +199,9 @@ impl Default for Ticket {
             content: None,
             intent: None,
             colour: None,
+            scaling: None,
+            orientation: None,
+            must_fit: false,
             pages: Vec::new(),
             held: false,
         }
@@ -186,6 +215,11 @@ impl Ticket {
         if attribute == "print-quality" {
             let found = word.parse().ok().filter(|quality| QUALITIES.contains(quality));
             self.quality = found.or(self.quality);
+            return found.is_some();
+        }
+        if attribute == "print-scaling" {
+            let found = Scaling::ALL.into_iter().find(|scaling| scaling.name() == word);
+            self.scaling = found.or(self.scaling);
             return found.is_some();
         }
         let place = match attribute {
@@ -240,8 +274,20 @@ impl Ticket {
                     _ => true,
                 }
             }),
-            ("media-type" | "print-content-optimize" | "print-rendering-intent" | "print-color-mode", _) => {
-                word().is_some_and(|word| self.ask(name, &word))
+            (
+                "media-type"
+                | "print-content-optimize"
+                | "print-rendering-intent"
+                | "print-color-mode"
+                | "print-scaling",
+                _,
+            ) => word().is_some_and(|word| self.ask(name, &word)),
+            ("orientation-requested", IppValue::Enum(asked)) => {
+                let found = ORIENTATIONS.iter().any(|(known, _)| known == asked);
+                if found {
+                    self.orientation = Some(*asked);
+                }
+                found
             }
             ("print-quality", IppValue::Enum(quality)) => self.ask(name, &quality.to_string()),
             ("page-ranges", _) => each(value).iter().all(|range| match range {
@@ -259,13 +305,9 @@ impl Ticket {
                 }
                 _ => false,
             },
-            ("orientation-requested" | "finishings" | "number-up" | "job-priority", value) => {
-                matches!(
-                    (name, value),
-                    ("orientation-requested" | "finishings", IppValue::Enum(3))
-                        | ("number-up", IppValue::Integer(1))
-                ) || matches!((name, value), ("job-priority", IppValue::Integer(1..=100)))
-            }
+            ("finishings", value) => *value == IppValue::Enum(3),
+            ("number-up", value) => *value == IppValue::Integer(1),
+            ("job-priority", value) => matches!(value, IppValue::Integer(1..=100)),
             ("printer-resolution", IppValue::Resolution { cross_feed, feed, units: 3 }) => {
                 cross_feed == feed && RESOLUTIONS.iter().any(|&known| i32::from(known) == *feed)
             }
@@ -311,6 +353,14 @@ impl Ticket {
                 (value.set)(&mut choices);
             }
         }
+        let turn = |asked| ORIENTATIONS.iter().find(|(known, _)| *known == asked).and_then(|(_, turn)| *turn);
+        let usual = preset.fit.unwrap_or_default();
+        choices.fit = Some(Wish {
+            scaling: self.scaling.unwrap_or(usual.scaling),
+            turn: self.orientation.map_or(usual.turn, turn),
+            must_fit: self.must_fit,
+            ..usual
+        });
         choices.pages = self.pages();
         if let Some(paper) = self.size.and_then(paper) {
             choices.paper = paper;
@@ -357,7 +407,8 @@ mod tests {
     fn what_a_dialog_asks_changes_the_preset_and_nothing_else() {
         let preset = Choices { white: White::Under, ..Choices::default() };
         let mut ticket = Ticket::default();
-        assert_eq!(ticket.choices(&preset), preset);
+        let given = Choices { fit: Some(Wish::default()), ..preset.clone() };
+        assert_eq!(ticket.choices(&preset), given);
         let size = collection([
             ("x-dimension", IppValue::Integer(10000)),
             ("y-dimension", IppValue::Integer(14800)),
@@ -369,6 +420,8 @@ mod tests {
         assert!(ticket.take("print-color-mode", &keyword("monochrome")));
         assert!(ticket.take("print-content-optimize", &keyword("photo")));
         assert!(ticket.take("page-ranges", &IppValue::RangeOfInteger { min: 2, max: 3 }));
+        assert!(ticket.take("print-scaling", &keyword("fill")));
+        assert!(ticket.take("orientation-requested", &IppValue::Enum(5)));
         let asked = ticket.choices(&preset);
         let expected = Choices {
             media: Media::Plain,
@@ -378,6 +431,7 @@ mod tests {
             intent: Intent::Perceptual,
             pages: vec![2..=3],
             paper: Paper::Postcard,
+            fit: Some(Wish { scaling: Scaling::Fill, turn: Some(Turn::Right), ..Wish::default() }),
             ..preset
         };
         assert_eq!(asked, expected);
@@ -400,7 +454,8 @@ mod tests {
             ("print-quality", IppValue::Enum(9)),
             ("sides", keyword("two-sided-long-edge")),
             ("page-ranges", IppValue::RangeOfInteger { min: 3, max: 2 }),
-            ("orientation-requested", IppValue::Enum(4)),
+            ("orientation-requested", IppValue::Enum(8)),
+            ("print-scaling", keyword("shrink")),
             ("wallpaper", keyword("yes")),
         ] {
             assert!(!ticket.take(name, &value), "{name}");

@@ -12,7 +12,7 @@ use std::io::Cursor;
 use std::net::IpAddr;
 
 use ipp::attribute::{IppAttribute, IppAttributes};
-use ipp::model::{DelimiterTag, IppVersion, Operation, StatusCode};
+use ipp::model::{DelimiterTag, IppVersion, StatusCode};
 use ipp::parser::IppParser;
 use ipp::prelude::IppHeader;
 use ipp::reader::IppReader;
@@ -29,23 +29,71 @@ const MOST_VALUES: usize = 4096;
 /// Version, operation and number of a request.
 const HEADER: usize = 8;
 
-/// The operations there are.
-pub const OPERATIONS: [Operation; 14] = [
-    Operation::PrintJob,
-    Operation::ValidateJob,
-    Operation::CreateJob,
-    Operation::SendDocument,
-    Operation::CancelJob,
-    Operation::GetJobAttributes,
-    Operation::GetJobs,
-    Operation::GetPrinterAttributes,
-    Operation::HoldJob,
-    Operation::ReleaseJob,
-    Operation::CancelJobs,
-    Operation::CancelMyJobs,
-    Operation::CloseJob,
-    Operation::IdentifyPrinter,
-];
+/// The operations there are, with their codes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(i16)]
+pub enum Operation {
+    /// A job with its document.
+    PrintJob = 0x02,
+    /// Whether a job would be taken.
+    ValidateJob = 0x04,
+    /// A job without its document.
+    CreateJob = 0x05,
+    /// The document of a job.
+    SendDocument = 0x06,
+    /// A job ends.
+    CancelJob = 0x08,
+    /// What is known of a job.
+    GetJobAttributes = 0x09,
+    /// All jobs.
+    GetJobs = 0x0a,
+    /// What is known of a printer.
+    GetPrinterAttributes = 0x0b,
+    /// A job waits until it is released.
+    HoldJob = 0x0c,
+    /// It does not wait any more.
+    ReleaseJob = 0x0d,
+    /// Jobs of anybody end.
+    CancelJobs = 0x38,
+    /// Jobs of whoever asks end.
+    CancelMyJobs = 0x39,
+    /// A job has all its documents.
+    CloseJob = 0x3b,
+    /// The printer shows which it is.
+    IdentifyPrinter = 0x3c,
+}
+
+impl Operation {
+    /// All of them.
+    pub const ALL: [Operation; 14] = [
+        Operation::PrintJob,
+        Operation::ValidateJob,
+        Operation::CreateJob,
+        Operation::SendDocument,
+        Operation::CancelJob,
+        Operation::GetJobAttributes,
+        Operation::GetJobs,
+        Operation::GetPrinterAttributes,
+        Operation::HoldJob,
+        Operation::ReleaseJob,
+        Operation::CancelJobs,
+        Operation::CancelMyJobs,
+        Operation::CloseJob,
+        Operation::IdentifyPrinter,
+    ];
+
+    /// The code in a request.
+    #[must_use]
+    pub const fn code(self) -> i16 {
+        self as i16
+    }
+
+    /// The operation of a request.
+    #[must_use]
+    pub fn of(code: i16) -> Option<Operation> {
+        Operation::ALL.into_iter().find(|known| known.code() == code)
+    }
+}
 
 /// Where a request came in.
 #[derive(Clone, Debug)]
@@ -58,8 +106,8 @@ pub struct Place {
     pub printer: String,
     /// Where the client is.
     pub from: IpAddr,
-    /// Whether it may change jobs of others.
-    pub may_change: bool,
+    /// Whether it is this computer, or knows the code.
+    pub is_keeper: bool,
 }
 
 impl Place {

@@ -19,6 +19,7 @@ use observe::{Observer, with_causes};
 use press::inspect::sheets;
 use protocol::ink::Ink;
 
+use crate::budget::{Purpose, Turn};
 use crate::jobs::{Job, State};
 use crate::server::{Cartridge, ChangeError, Server};
 use crate::spool::JOB;
@@ -27,7 +28,7 @@ use device::questions::status::Status;
 use make::options::is_chosen;
 use queue::backend::{self, Sheets};
 use queue::call::{Call, Exit};
-use queue::filter::{self, FilterError};
+use queue::filter::{self, FilterError, Filtered};
 use queue::messages::{Reason, Report, colour};
 
 /// Prints one job after the other, for ever.
@@ -64,7 +65,7 @@ fn print(server: &Server, job: &Job) -> Result<(), ChangeError> {
         listed: (String::new(), String::new()),
         lister: PathBuf::new(),
     };
-    let drawn = prepare_for(server, job.id, &voice);
+    let drawn = prepare_for(server, job.id, &voice, Purpose::Print);
     // A sheet that is open at the bridge is ended there first, whatever became of the job.
     if voice.is_cancelled() && !server.is_open(job) {
         return end(server, &call, &voice, State::Canceled, "cancelled");
@@ -76,7 +77,7 @@ fn print(server: &Server, job: &Job) -> Result<(), ChangeError> {
     let stop = || voice.is_cancelled();
     let (exit, whole) = backend::deliver(&call, &server.settings.devices, &folder, &voice, &stop, &stop);
     match exit {
-        Exit::Ok if whole => end(server, &call, &voice, State::Completed, "printed"),
+        Exit::Ok if whole => end(server, &call, &voice, State::Completed, &voice.printed()),
         Exit::Ok => end(server, &call, &voice, State::Canceled, "cancelled"),
         Exit::Cancel => {
             let why = voice.last();
@@ -110,12 +111,12 @@ fn end(server: &Server, call: &Call, voice: &Voice<'_>, state: State, why: &str)
 /// # Errors
 /// In words: why there are none.
 pub fn prepare(server: &Server, id: u32) -> Result<(), String> {
-    prepare_for(server, id, &Voice { server, id, stage: Mutex::default() })
+    prepare_for(server, id, &Voice { server, id, stage: Mutex::default() }, Purpose::Look)
 }
 
 /// Makes the sheets of a job unless they are there, and puts on record that all of them are.
-fn prepare_for(server: &Server, id: u32, voice: &Voice<'_>) -> Result<(), String> {
-    let _drawing = server.drawing.lock().unwrap_or_else(PoisonError::into_inner);
+fn prepare_for(server: &Server, id: u32, voice: &Voice<'_>, purpose: Purpose) -> Result<(), String> {
+    let turn = server.drawing.take(purpose);
     let job = server.data().jobs.get(&id).cloned().ok_or("there is no such job")?;
     if job.sheets.is_some() {
         return Ok(());
@@ -125,18 +126,19 @@ fn prepare_for(server: &Server, id: u32, voice: &Voice<'_>) -> Result<(), String
     }
     // Which sheet that is, is decided when the job is drawn, and stays known.
     let job = Job { ticket: job.ticket.on(server.data().loaded()), ..job };
-    draw(server, &job, voice)?;
+    let drawn = draw(server, &job, voice, &turn)?;
     let count = Folder::of(&server.store.sheets(id)).files.len();
     let kept = server.change(id, |kept| {
         kept.sheets = Some(u32::try_from(count).unwrap_or(u32::MAX).saturating_mul(job.ticket.copies));
         (kept.ticket.size, kept.ticket.kind) = (job.ticket.size, job.ticket.kind);
+        (kept.laid, kept.is_cut) = (drawn.laid, drawn.is_cut);
         Ok(())
     });
     kept.map_err(|error| with_causes(&error))
 }
 
-/// Makes the sheets of a job.
-fn draw(server: &Server, job: &Job, voice: &Voice<'_>) -> Result<(), String> {
+/// Makes the sheets of a job, and says how its pages lie.
+fn draw(server: &Server, job: &Job, voice: &Voice<'_>, turn: &Turn<'_>) -> Result<Filtered, String> {
     let text = |error: io::Error| format!("cannot keep the job's sheets: {error}");
     let to = server.store.sheets(job.id);
     match fs::remove_dir_all(&to) {
@@ -146,7 +148,8 @@ fn draw(server: &Server, job: &Job, voice: &Voice<'_>) -> Result<(), String> {
     durable::make_folder(&to, Access::Private).map_err(text)?;
     let document = job.document.as_deref().ok_or("the job has no document")?;
     let path = server.store.folder(job.id).join(document);
-    let mut out = SheetFiles { folder: &to, count: 0, voice };
+    let mut out = SheetFiles { folder: &to, count: 0, voice, turn };
+    let mut drawn = Filtered::default();
     if job.format == JOB {
         let bytes = fs::read(&path).map_err(text)?;
         let (all, pages) = (sheets(&bytes), job.ticket.pages());
@@ -162,12 +165,12 @@ fn draw(server: &Server, job: &Job, voice: &Voice<'_>) -> Result<(), String> {
             .ok_or("its printer is not there any more; print it on another one")?;
         let choices = job.ticket.choices(&preset.choices);
         let file = fs::File::open(&path).map_err(text)?;
-        filter::run(file, Some(&path), &choices, &server.settings.library, &mut out, voice)
+        drawn = filter::run(file, Some(&path), &choices, &server.settings.library, &mut out, voice)
             .map_err(|error| with_causes(&error))?;
     }
     match out.count {
         0 => Err("there is nothing to print: every page is blank".into()),
-        _ => durable::sync_folder(&to).map_err(text),
+        _ => durable::sync_folder(&to).map(|()| drawn).map_err(text),
     }
 }
 
@@ -176,12 +179,17 @@ struct SheetFiles<'a> {
     folder: &'a Path,
     count: usize,
     voice: &'a Voice<'a>,
+    turn: &'a Turn<'a>,
 }
 
 impl Write for SheetFiles<'_> {
     fn write(&mut self, sheet: &[u8]) -> io::Result<usize> {
         if self.voice.is_cancelled() {
             return Err(io::Error::other("the job is cancelled"));
+        }
+        // Meanwhile the job itself may have been printed.
+        if self.turn.give_way() && !self.voice.waits() {
+            return Err(io::Error::other("the job is printed"));
         }
         self.count += 1;
         durable::write(&self.folder.join(format!("{:05}.rgl", self.count)), sheet, Access::Private)?;
@@ -233,6 +241,21 @@ struct Voice<'a> {
 impl Voice<'_> {
     fn is_cancelled(&self) -> bool {
         self.server.data().jobs.get(&self.id).is_none_or(|job| job.cancel)
+    }
+
+    /// Whether the job waits.
+    fn waits(&self) -> bool {
+        let waits = |job: &Job| matches!(job.state, State::Pending | State::Held);
+        self.server.data().jobs.get(&self.id).is_some_and(waits)
+    }
+
+    /// That it is printed, and how its pages lie.
+    fn printed(&self) -> String {
+        let laid = self.server.data().jobs.get(&self.id).map(|job| job.laid.join("; "));
+        match laid {
+            Some(laid) if !laid.is_empty() => format!("printed; {laid}"),
+            _ => "printed".into(),
+        }
     }
 
     fn last(&self) -> String {

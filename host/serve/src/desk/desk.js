@@ -5,11 +5,21 @@ const code = at("code");
 code.value = sessionStorage.getItem("code") ?? "";
 code.addEventListener("change", () => sessionStorage.setItem("code", code.value));
 let planned = 0;
+/** Keys of what this browser has uploaded, by the number of the job: they show that it is its own. */
+const MOST_KEYS = 50;
+const keys = new Map(JSON.parse(localStorage.getItem("keys") ?? "[]"));
+function remember(job, key) {
+  keys.delete(job);
+  keys.set(job, key);
+  for (const oldest of [...keys.keys()].slice(0, -MOST_KEYS)) keys.delete(oldest);
+  localStorage.setItem("keys", JSON.stringify([...keys]));
+}
+const headers = () => ({ "x-foilpress-code": code.value, "x-foilpress-keys": [...keys.values()].join(",") });
 
 async function post(path, parameters, body) {
   const answer = await fetch(`${path}?${new URLSearchParams(parameters)}`, {
     method: "POST",
-    headers: { "x-foilpress-code": code.value },
+    headers: headers(),
     body,
   });
   const text = await answer.text();
@@ -85,8 +95,14 @@ function show(about) {
       const line = document.createElement("li");
       const count = job.sheets ? ` (${job.done} of ${job.sheets})` : "";
       line.append(`${job.id} ${job.name}: ${job.state}${count}. ${job.message} `);
-      if (job.held) line.append(button("Release", job.name, () => post("/desk/release", { job: job.id })));
-      if (!job.over) line.append(button("Cancel", job.name, () => post("/desk/cancel", { job: job.id })));
+      if (job.held && job.mine) line.append(button("Release", job.name, () => post("/desk/release", { job: job.id })));
+      if (!job.over && job.mine && job.lacks) {
+        line.append(
+          button("It is loaded now", job.name, () => post("/desk/load", job.lacks)),
+          button("Print on the loaded sheet", job.name, () => post("/desk/lay", { job: job.id })),
+        );
+      }
+      if (!job.over && job.mine) line.append(button("Cancel", job.name, () => post("/desk/cancel", { job: job.id })));
       return line;
     }));
   }
@@ -99,7 +115,7 @@ function show(about) {
 
 async function look() {
   try {
-    show(await (await fetch("/desk.json")).json());
+    show(await (await fetch("/desk.json", { headers: headers() })).json());
   } catch {
     at("now").textContent = "The server does not answer.";
   }
@@ -113,7 +129,8 @@ async function propose(path, parameters, file) {
   at("plan").hidden = false;
   planned = 0;
   try {
-    const { job } = JSON.parse(await post(path, { printer: at("printer").value, ...parameters }, file));
+    const { job, key } = JSON.parse(await post(path, { printer: at("printer").value, ...parameters }, file));
+    remember(job, key);
     const plan = JSON.parse(await post("/desk/plan", { job }));
     planned = job;
     at("plan-words").textContent = `${plan.sheets} sheet${plan.sheets === 1 ? "" : "s"}; the first one takes these passes. ${plan.note}`;
@@ -122,7 +139,7 @@ async function propose(path, parameters, file) {
       line.textContent = `${ink}: ${dots.toLocaleString("en")} dots, about ${(ribbon_mm / 1000).toFixed(2)} m of ribbon`;
       return line;
     }));
-    at("preview").src = `/desk/preview.png?job=${job}`;
+    await picture(job);
   } catch (error) {
     at("plan").hidden = true;
     throw error;
@@ -130,6 +147,14 @@ async function propose(path, parameters, file) {
     // The same file can be chosen again.
     at("file").value = "";
   }
+}
+
+/** The picture of a job, which only its owner and the keeper see. */
+async function picture(job) {
+  const answer = await fetch(`/desk/preview.png?job=${job}`, { headers: headers() });
+  if (!answer.ok) throw new Error((await answer.text()).trim());
+  URL.revokeObjectURL(at("preview").src);
+  at("preview").src = URL.createObjectURL(await answer.blob());
 }
 
 async function settle(path) {

@@ -7,9 +7,9 @@ use ipp::value::IppValue;
 use crate::jobs::{Job, State};
 use crate::printer;
 use crate::server::{Data, Server};
-use crate::template::{AUTO, keyword_of};
+use crate::template::{AUTO, NO_ORIENTATION, keyword_of};
 use crate::values::{
-    date_time, each, integer, keyword, keywords, list, long_text, name, now, range, read_text, uri,
+    date_time, dpi, each, integer, keyword, keywords, list, long_text, name, now, range, read_text, uri,
 };
 use crate::wire::{Place, Request};
 use queue::messages::Reason;
@@ -33,7 +33,7 @@ impl Wanted {
 }
 
 /// What of a job is as its owner wants it.
-pub const TEMPLATE: [&str; 9] = [
+pub const TEMPLATE: [&str; 12] = [
     "copies",
     "media",
     "media-col",
@@ -42,6 +42,9 @@ pub const TEMPLATE: [&str; 9] = [
     "print-content-optimize",
     "print-rendering-intent",
     "print-color-mode",
+    "print-scaling",
+    "orientation-requested",
+    "printer-resolution",
     "sides",
 ];
 
@@ -57,6 +60,7 @@ pub fn state(data: &Data, job: &Job) -> (i32, Vec<&'static str>) {
         State::Held if job.ticket.held => (4, vec!["job-hold-until-specified"]),
         State::Held => (4, vec!["resources-are-not-ready"]),
         State::Processing | State::Pending if job.cancel => (5, vec!["processing-to-stop-point"]),
+        State::Pending if data.lacks_sheet(job) => (3, vec!["resources-are-not-ready"]),
         State::Pending => (3, vec!["none"]),
         State::Processing if data.reasons.iter().any(|&reason| stops(reason)) => {
             (6, vec!["printer-stopped", "job-printing"])
@@ -65,6 +69,7 @@ pub fn state(data: &Data, job: &Job) -> (i32, Vec<&'static str>) {
         State::Processing => (5, vec!["job-printing"]),
         State::Canceled => (7, vec!["job-canceled-by-user"]),
         State::Aborted => (8, vec!["aborted-by-system"]),
+        State::Completed if job.is_cut => (9, vec!["job-completed-with-warnings"]),
         State::Completed => (9, vec!["job-completed-successfully"]),
     }
 }
@@ -122,6 +127,9 @@ pub fn attributes(
         ("print-content-optimize", word(&ticket.content, AUTO)),
         ("print-rendering-intent", word(&ticket.intent, AUTO)),
         ("print-color-mode", word(&ticket.colour, AUTO)),
+        ("print-scaling", keyword(ticket.scaling.unwrap_or_default().name())),
+        ("orientation-requested", IppValue::Enum(ticket.orientation.unwrap_or(NO_ORIENTATION))),
+        ("printer-resolution", dpi(if ticket.quality == Some(3) { 300 } else { 600 })),
     ];
     let loaded = data.loaded();
     let size = ticket.size.unwrap_or(loaded.size);

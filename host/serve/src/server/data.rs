@@ -1,9 +1,11 @@
 //! What of a server changes: its jobs, its device, and the sheet that is loaded.
 //!
-//! The loaded sheet outlives the process, and a seed that makes the identities of printers and jobs this computer's own.
+//! The loaded sheet and the code outlive the process, and a seed that makes the identities of printers and
+//! jobs this computer's own.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::time::Instant;
 
 use files::durable::{self, Access};
 use protocol::paper::Paper;
@@ -11,8 +13,9 @@ use queue::messages::Reason;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
+use crate::budget::Client;
 use crate::jobs::{Job, State};
-use crate::template::{Loaded, paper, size};
+use crate::template::{AUTO, Loaded, Size, label, paper, size};
 
 /// What a cartridge says of itself.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
@@ -30,6 +33,8 @@ pub struct Cartridge {
 pub(super) struct Kept {
     /// Makes the identities of printers this computer's own.
     pub(super) seed: String,
+    /// What somebody elsewhere has to know to change things.
+    pub(super) code: String,
     pub(super) loaded: Loaded,
 }
 
@@ -38,8 +43,16 @@ pub struct Data {
     /// All jobs that are known.
     pub jobs: BTreeMap<u32, Job>,
     pub(super) next: u32,
+    /// Whether what sheets are sent to takes every sheet, as a folder does.
+    pub(super) takes_any_sheet: bool,
     /// When the last operation of a job without its document ended; none while its document comes.
-    pub(super) heard: BTreeMap<u32, Option<u64>>,
+    pub(super) heard: BTreeMap<u32, Option<Instant>>,
+    /// Since when jobs of the desk wait to be released.
+    pub(super) held: BTreeMap<u32, Instant>,
+    /// Unpacked bytes of documents that come just now.
+    pub(super) arriving: BTreeMap<u32, u64>,
+    /// Who looks at what would be printed.
+    pub(super) looking: BTreeSet<Client>,
     /// Why the device does not print, or soon will not.
     pub reasons: Vec<Reason>,
     /// What it does, for people.
@@ -53,8 +66,9 @@ pub struct Data {
     pub changed: u64,
     /// When the sheet changed.
     pub configured: u64,
-    /// Somebody wants to see which printer this is.
+    /// Somebody wants to see which printer this is: when, in seconds since 1970.
     pub identify: u64,
+    pub(super) identified: Option<Instant>,
 }
 
 impl Data {
@@ -73,12 +87,31 @@ impl Data {
         self.jobs.values().find(|job| job.state == State::Held && !job.ticket.held)
     }
 
+    /// Whether a job is for another sheet than the one that is loaded.
+    pub fn lacks_sheet(&self, job: &Job) -> bool {
+        let Loaded { size, kind } = self.loaded();
+        let is_other_size = job.ticket.size.is_some_and(|asked| paper(asked) != paper(*size));
+        let is_other_kind = |asked: &String| asked != AUTO && kind != AUTO && asked != kind;
+        !self.takes_any_sheet && (is_other_size || job.ticket.kind.as_ref().is_some_and(is_other_kind))
+    }
+
+    /// A job that waits for its sheet, while nothing else can be printed.
+    pub fn waiting(&self) -> Option<&Job> {
+        let pending = || self.jobs.values().filter(|job| job.state == State::Pending);
+        pending()
+            .find(|job| self.lacks_sheet(job))
+            .filter(|_| self.current().is_none() && pending().all(|job| self.lacks_sheet(job)))
+    }
+
     /// Why the device does not print, or soon will not, as keywords. While another job is printed, one that has stopped is a warning.
     pub fn keywords(&self) -> Vec<&'static str> {
         let mut all: Vec<&str> = self.reasons.iter().map(|reason| reason.keyword()).collect();
         let word = if self.current().is_some() { "other-warning" } else { "other-error" };
         if self.stopped().is_some() && !all.contains(&word) {
             all.push(word);
+        }
+        if self.waiting().is_some() && !all.contains(&"media-needed") {
+            all.push("media-needed");
         }
         all
     }
@@ -87,13 +120,44 @@ impl Data {
     pub fn said(&self) -> String {
         match (self.current(), self.stopped()) {
             (None, Some(job)) => format!("job {}: {}", job.id, job.message),
-            _ => self.message.clone(),
+            _ => self.waiting().map_or_else(|| self.message.clone(), |job| self.wants(job)),
         }
+    }
+
+    /// Which sheet a job waits for, for people.
+    fn wants(&self, job: &Job) -> String {
+        let sheet = |size: Size, kind: &str| match kind {
+            AUTO => label(size),
+            kind => format!("{} of {kind}", label(size)),
+        };
+        let Loaded { size, kind } = self.loaded();
+        let asked = job.ticket.kind.as_deref().unwrap_or(AUTO);
+        format!(
+            "job {} waits for a sheet of {}; {} is loaded: load it and say so, or print on the loaded one",
+            job.id,
+            sheet(job.ticket.size.unwrap_or(*size), asked),
+            sheet(*size, kind)
+        )
     }
 
     /// Jobs that are not over.
     pub fn open(&self) -> usize {
         self.jobs.values().filter(|job| !job.state.is_over()).count()
+    }
+
+    /// Those of a client.
+    pub(super) fn open_of(&self, client: Client) -> usize {
+        self.jobs.values().filter(|job| !job.state.is_over() && job.owner.client() == client).count()
+    }
+
+    /// Bytes of the documents of a client, and of all, that are not over.
+    pub(super) fn octets(&self, client: Client) -> (u64, u64) {
+        let open = self.jobs.values().filter(|job| !job.state.is_over());
+        open.fold((0, 0), |(own, all), job| {
+            let octets = job.octets.max(self.arriving.get(&job.id).copied().unwrap_or(0));
+            let is_own = job.owner.client() == client;
+            (own + if is_own { octets } else { 0 }, all + octets)
+        })
     }
 }
 
@@ -122,13 +186,28 @@ pub(super) fn kept(folder: &Path) -> std::io::Result<Kept> {
     let mut seed = [0; 16];
     crate::random(&mut seed)?;
     let loaded = Loaded { size: size(Paper::A4), kind: crate::template::AUTO.into() };
-    let kept = Kept { seed: hex(&seed), loaded };
+    let kept = Kept { seed: hex(&seed), code: code()?, loaded };
     keep(&path, &kept)?;
     Ok(kept)
 }
 
 pub(super) fn keep(path: &Path, kept: &Kept) -> std::io::Result<()> {
     durable::write(path, &serde_json::to_vec(kept)?, Access::Private)
+}
+
+/// A code for people: no letters that look alike, and 2^40 of them are not tried out over a network.
+fn code() -> std::io::Result<String> {
+    const LETTERS: &[u8; 32] = b"abcdefghijkmnpqrstuvwxyz23456789";
+    let mut bytes = [0; 8];
+    crate::random(&mut bytes)?;
+    Ok(bytes.iter().map(|byte| char::from(LETTERS[usize::from(byte % 32)])).collect())
+}
+
+/// A key for a browser, which shows that a job is its own.
+pub(crate) fn key() -> std::io::Result<String> {
+    let mut bytes = [0; 16];
+    crate::random(&mut bytes)?;
+    Ok(hex(&bytes))
 }
 
 fn hex(bytes: &[u8]) -> String {

@@ -123,7 +123,7 @@ fn devices() -> [Device; 3] {
                 ],
             ]
             .concat(),
-            ignored: &["print-scaling"],
+            ignored: &[],
         },
         Device {
             name: "Windows",

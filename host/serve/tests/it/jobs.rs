@@ -25,7 +25,7 @@ impl Running {
     }
 
     /// Prints a document with these attributes of the job; the job once it is in this state.
-    fn print(&self, asked: &[Attribute<'_>], document: &[u8], until: State) -> Job {
+    pub(super) fn print(&self, asked: &[Attribute<'_>], document: &[u8], until: State) -> Job {
         let uri = format!("ipp://{}/ipp/print", self.address);
         let bytes = [ipp::request(ipp::PRINT, &uri, &[], asked), document.to_vec()].concat();
         let (_, answer) = ipp::ask(self.address, &bytes).unwrap();
@@ -53,7 +53,7 @@ impl Running {
         String::from_utf8_lossy(&ipp::ask(self.address, &bytes).unwrap().1).into_owned()
     }
 
-    fn sheets_of(&self, job: &Job) -> Vec<Vec<u8>> {
+    pub(super) fn sheets_of(&self, job: &Job) -> Vec<Vec<u8>> {
         let begins = job.identity();
         let kept = fs::read_dir(self.path("sheets")).unwrap().map(|entry| entry.unwrap().path());
         let mut own: Vec<_> =
@@ -159,7 +159,7 @@ fn a_document_may_take_longer_to_arrive_than_to_be_awaited() {
         std::thread::sleep(Duration::from_millis(20));
     }
     // All that had begun to wait by the end of time.
-    running.server.time_out(u64::MAX);
+    running.server.time_out(Duration::ZERO, Duration::MAX);
     let mut states: Vec<State> = running.server.data().jobs.values().map(|job| job.state).collect();
     states.sort_by_key(|state| state.is_over());
     assert_eq!(states, [State::Incoming, State::Aborted]);

@@ -173,21 +173,6 @@ fn sixty_four_clients_at_once_are_all_served() {
 }
 
 #[test]
-fn one_computer_gets_no_more_than_its_share_of_connections() {
-    let running = Running::start(Limits { of_one: 4, ..Limits::default() }, false);
-    let held: Vec<TcpStream> = (0..4).map(|_| TcpStream::connect(running.address).unwrap()).collect();
-    let ask = || http(running.address, &format!("GET / HTTP/1.1\r\nHost: {}\r\n", running.address), b"");
-    // Connections are taken in their order.
-    assert!(ask().is_err());
-    drop(held);
-    let start = Instant::now();
-    while ask().is_err() {
-        assert!(start.elapsed() < Duration::from_secs(10));
-        std::thread::sleep(Duration::from_millis(20));
-    }
-}
-
-#[test]
 fn a_job_is_cancelled_held_and_released_in_every_state_before_it_is_printed() {
     let running = Running::start(Limits::default(), false);
     let to = running.address;

@@ -5,6 +5,7 @@ mod browser;
 mod clients;
 mod desk;
 mod devices;
+mod fitted;
 mod jobs;
 mod limits;
 mod rights;
@@ -34,15 +35,24 @@ impl Running {
     /// With these limits. `prints` says whether anything becomes of jobs.
     pub fn start(limits: Limits, prints: bool) -> Running {
         let folder = tempfile::tempdir().unwrap();
+        let to = format!("file:{}", folder.path().join("sheets").display());
+        Running::begin(folder, &to, limits, prints)
+    }
+
+    /// One that sends sheets there, and prints nothing.
+    pub fn start_to(to: &str, limits: Limits) -> Running {
+        Running::begin(tempfile::tempdir().unwrap(), to, limits, false)
+    }
+
+    fn begin(folder: TempDir, to: &str, limits: Limits, prints: bool) -> Running {
         let choices = Choices::default();
         let settings = Settings {
-            to: format!("file:{}", folder.path().join("sheets").display()).parse().unwrap(),
+            to: to.parse().unwrap(),
             printers: vec![Preset { name: "standard".into(), about: "ALPS MD-5500".into(), choices }],
             folder: folder.path().join("serve"),
             library: Library::builtin(),
             devices: device::printers::Printers::at(&folder.path().join("printers")).unwrap(),
             hosts: vec!["workshop.local".into()],
-            code: "secret".into(),
         };
         let server = Arc::new(Server::begin(settings, Box::new(Silent)).unwrap());
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();

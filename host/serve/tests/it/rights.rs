@@ -23,14 +23,14 @@ struct Asks(&'static str, &'static str, bool);
 const OWNER: Asks = Asks("192.168.1.7", "ada", false);
 const OTHERS: [Asks; 2] = [Asks("192.168.1.8", "ada", false), Asks("192.168.1.7", "eve", false)];
 
-fn ask(server: &Server, Asks(from, user, may_change): &Asks, operation: u16, job: u32) -> u16 {
+fn ask(server: &Server, Asks(from, user, is_keeper): &Asks, operation: u16, job: u32) -> u16 {
     let from: IpAddr = from.parse().unwrap();
     let place = Place {
         host: "192.168.1.5:8631".into(),
         is_encrypted: false,
         printer: "standard".into(),
         from,
-        may_change: *may_change,
+        is_keeper: *is_keeper,
     };
     let number = (job as i32).to_be_bytes();
     let named = [(0x42, "requesting-user-name", user.as_bytes()), (0x21, "job-id", &number[..])];
@@ -46,7 +46,7 @@ fn a_job_is_changed_by_its_owner_or_with_the_code() {
     let server = &running.server;
     let printer = server.printer("").unwrap();
     let create = || {
-        let owner = Owner { user: OWNER.1.into(), from: Some(OWNER.0.parse().unwrap()) };
+        let owner = Owner { user: OWNER.1.into(), from: Some(OWNER.0.parse().unwrap()), key: None };
         server.create(printer, "leaf", owner, Ticket::default()).unwrap()
     };
     let state = |job: u32| server.data().jobs[&job].state;
