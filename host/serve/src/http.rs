@@ -30,7 +30,7 @@ use tokio_rustls::TlsAcceptor;
 
 use crate::access::{self, Asked, Asker, Refused, Route, Says};
 use crate::body::{Gone, Limits, drain, keep, piece, plain, words};
-use crate::budget::{Client, Connection, Connections};
+use crate::budget::{Client, Connection, Connections, MOST_OF_ONE};
 use crate::desk;
 use crate::operations;
 use crate::server::Server;
@@ -42,8 +42,8 @@ const CODE: HeaderName = HeaderName::from_static("x-foilpress-code");
 
 /// The header in which a page shows the keys of what its browser has uploaded, separated by commas.
 const KEYS: HeaderName = HeaderName::from_static("x-foilpress-keys");
-/// The most of them.
-const MOST_KEYS: usize = 50;
+/// The most of them: nobody has more jobs that wait.
+const MOST_KEYS: usize = MOST_OF_ONE;
 
 /// How long somebody waits who asked for what they may not: whoever guesses is slow.
 const REFUSED: Duration = Duration::from_secs(1);

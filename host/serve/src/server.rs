@@ -531,10 +531,14 @@ impl Server {
             let left = lying.iter().filter(|(_, since)| is_late(**since, held));
             (late.map(|(id, _)| *id).collect(), left.map(|(id, _)| *id).collect())
         };
-        let ends = late.into_iter().map(|id| (id, "the document did not come in time"));
-        let ends = ends.chain(left.into_iter().map(|id| (id, "nobody printed it within a day")));
-        for (id, why) in ends {
+        let ends = late.into_iter().map(|id| (id, State::Incoming, "the document did not come in time"));
+        let ends = ends.chain(left.into_iter().map(|id| (id, State::Held, "nobody printed it within a day")));
+        for (id, state, why) in ends {
             let ended = self.change(id, |job| {
+                // Somebody may have released it just now.
+                if job.state != state {
+                    return Err(ChangeError::State("not waiting"));
+                }
                 (job.state, job.ended) = (State::Aborted, Some(crate::values::now()));
                 job.message = why.into();
                 Ok(())
