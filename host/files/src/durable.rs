@@ -33,6 +33,25 @@ pub fn free(folder: &Path) -> Option<u64> {
     }
 }
 
+/// Whether something failed because the disk, or somebody's share of it, is full.
+#[must_use]
+pub fn is_full(error: &(dyn std::error::Error + 'static)) -> bool {
+    let mut next = Some(error);
+    while let Some(error) = next {
+        let of_system = error.downcast_ref::<io::Error>();
+        let kind = of_system.map(io::Error::kind);
+        if matches!(kind, Some(io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded)) {
+            return true;
+        }
+        // One of the system may hold another one, which says why.
+        next = match of_system.and_then(io::Error::get_ref) {
+            Some(held) => Some(held),
+            None => error.source(),
+        };
+    }
+    false
+}
+
 /// Who may read a file. Only its owner may change it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Access {

@@ -1,15 +1,17 @@
 //! The backend: what the print system starts to bring a job to the printer.
 //!
-//! Problem: the print system starts jobs again after a crash of its own, retries what failed, and knows nothing of
-//! ribbons; a sheet must not be printed twice, and a job that is cancelled must leave a printer that is ready.
-//! Method: a job's sheets go one after the other to the [delivery](device::deliver), as every command's do. Each has a journal
-//! of its own under the job's identity, so a process that takes over knows what was sent and continues where the printer is. A
-//! sheet whose outcome is unknown, and a printer that has to be reset, hold the job: nobody can be asked here. Whoever releases
-//! a held job agrees to the reset and to printing the sheet again. SIGTERM ends the sheet at the bridge, also one that an earlier process
-//! has begun.
-//! What an earlier job has left open at the bridge is ended first; a server of its own sees to it that no other job of its is among those.
-//! For the print system the backend ends when the last sheet is *sent*: while the printer prints from its own memory the next job
-//! may come. A server of its own waits until each sheet is out.
+//! Problem: the print system starts jobs again after a crash of its own, retries what failed, and knows
+//! nothing of ribbons; a sheet must not be printed twice, and a job that is cancelled must leave a printer
+//! that is ready.
+//! Method: a job's sheets go one after the other to the [delivery](device::deliver), as every command's do.
+//! Each has a journal of its own under the job's identity, so a process that takes over knows what was sent
+//! and continues where the printer is. A sheet whose outcome is unknown, and a printer that has to be reset,
+//! hold the job: nobody can be asked here. Whoever releases a held job agrees to the reset and to printing
+//! the sheet again. SIGTERM ends the sheet at the bridge, also one that an earlier process has begun.
+//! What an earlier job has left open at the bridge is ended first; a server of its own sees to it that no
+//! other job of its is among those.
+//! For the print system the backend ends when the last sheet is *sent*: while the printer prints from its own
+//! memory the next job may come. A server of its own waits until each sheet is out.
 //! Limits: jobs of up to 1 GB. A raw device tells nothing, so a job that was interrupted there is held.
 //! Source: backend(7).
 
@@ -36,7 +38,7 @@ use device::transit::finish::Sheet;
 use device::transit::journal::{Entry, Journal, OpenJob};
 use device::transit::raw::RawError;
 use device::transit::session::{Outcome, Phase, SessionError};
-use files::durable::{self, Access};
+use files::durable::{self, Access, is_full};
 use observe::Silent;
 use press::inspect::sheets;
 use system::System;
@@ -63,16 +65,16 @@ struct Backend<'a> {
     given_up: &'a dyn Fn() -> bool,
 }
 
-/// The sheets of a job, each one whole job in the printer's language.
+/// The sheets of a job, each one whole job in the printer's language. They may still be made.
 pub trait Sheets {
-    /// How many there are.
+    /// How many there are so far.
     fn count(&self) -> usize;
 
-    /// The bytes of one, from 0.
+    /// The bytes of one, from 0, as soon as it is made; none behind the last one.
     ///
     /// # Errors
     /// What the system says.
-    fn sheet(&self, index: usize) -> io::Result<Cow<'_, [u8]>>;
+    fn sheet(&self, index: usize) -> io::Result<Option<Cow<'_, [u8]>>>;
 }
 
 /// Sheets behind each other.
@@ -86,12 +88,13 @@ impl Sheets for Row {
         self.places.len()
     }
 
-    fn sheet(&self, index: usize) -> io::Result<Cow<'_, [u8]>> {
-        Ok(Cow::Borrowed(&self.bytes[self.places[index].clone()]))
+    fn sheet(&self, index: usize) -> io::Result<Option<Cow<'_, [u8]>>> {
+        Ok(self.places.get(index).map(|place| Cow::Borrowed(&self.bytes[place.clone()])))
     }
 }
 
-/// Prints a job of the print system. `input` is standard input; `stop` says whether the print system has asked to end.
+/// Prints a job of the print system. `input` is standard input; `stop` says whether the print system has
+/// asked to end.
 pub fn run(
     call: &Call,
     printers: &Printers,
@@ -154,8 +157,9 @@ fn folders(job: &Path) -> impl Iterator<Item = PathBuf> {
     found.filter(|path| path.is_dir())
 }
 
-/// Prints sheets, one after the other; says whether all of them were sent. What is known of them stays until [`forget`], so that
-/// it outlives whoever keeps the job. `given_up` says whether a job that was stopped is not to go on later.
+/// Prints sheets, one after the other, as they are made; says whether all of them were sent. What is known of
+/// them stays until [`forget`], so that it outlives whoever keeps the job. `given_up` says whether a job that
+/// was stopped is not to go on later.
 pub fn deliver(
     call: &Call,
     printers: &Printers,
@@ -184,8 +188,8 @@ fn read(call: &Call, input: &mut dyn Read) -> io::Result<Vec<u8>> {
     Ok(job)
 }
 
-/// Whether the print system has given the job up for good: it lists its jobs, but not this one. When it ends itself, it
-/// stops jobs in the same way, but then it lists none.
+/// Whether the print system has given the job up for good: it lists its jobs, but not this one. When it ends
+/// itself, it stops jobs in the same way, but then it lists none.
 fn is_given_up(call: &Call) -> bool {
     let (queue, job) = &call.listed;
     let mut command = Command::new(&call.lister);
@@ -204,10 +208,17 @@ impl Backend<'_> {
         Stopped(exit)
     }
 
-    fn bytes<'s>(&self, sheets: &'s dyn Sheets, index: usize) -> Result<Cow<'s, [u8]>, Stopped> {
+    fn bytes<'s>(&self, sheets: &'s dyn Sheets, index: usize) -> Result<Option<Cow<'s, [u8]>>, Stopped> {
         sheets
             .sheet(index)
             .map_err(|error| self.fail(Exit::Failed, &format!("cannot read sheet {}: {error}", index + 1)))
+    }
+
+    /// Judges a sheet, from 0.
+    fn check(&self, bytes: &[u8], index: usize) -> Result<Checked, Stopped> {
+        encodings::check(bytes, &Silent).map_err(|error| {
+            self.fail(Exit::Cancel, &format!("sheet {}: {}", index + 1, observe::with_causes(&error)))
+        })
     }
 
     fn deliver(&self, sheets: &dyn Sheets) -> Result<bool, Stopped> {
@@ -217,30 +228,33 @@ impl Backend<'_> {
         if ends && !is_open(&self.call.to, &folder) {
             return Ok(false);
         }
-        // All are judged before the first byte leaves.
+        // All that are made are judged before the first byte leaves.
         let mut checked = Vec::new();
         for index in 0..sheets.count() {
-            checked.push(encodings::check(&self.bytes(sheets, index)?, &Silent).map_err(|error| {
-                let text =
-                    format!("sheet {} of {}: {}", index + 1, sheets.count(), observe::with_causes(&error));
-                self.fail(Exit::Cancel, &text)
-            })?);
-        }
-        if checked.iter().any(|sheet| sheet.dialect.is_some()) {
-            self.messages.info("the job is in another driver's dialect; it is sent unchanged");
+            if let Some(bytes) = self.bytes(sheets, index)? {
+                checked.push(self.check(&bytes, index)?);
+            }
         }
         if let (Destination::Bridge(address), false) = (&self.call.to, ends) {
             self.end_what_was_left(address, &folder)?;
         }
-        let mut number = 0;
+        let (mut number, mut is_foreign) = (0, false);
         for _ in 0..self.call.copies {
-            for (index, checked) in checked.iter().enumerate() {
+            for index in 0.. {
+                let Some(bytes) = self.bytes(sheets, index)? else { break };
+                if index == checked.len() {
+                    checked.push(self.check(&bytes, index)?);
+                }
+                if checked[index].dialect.is_some() && !std::mem::replace(&mut is_foreign, true) {
+                    self.messages.info("the job is in another driver's dialect; it is sent unchanged");
+                }
                 number += 1;
                 let own = folder.join(format!("{number:04}"));
                 let goes = if ends { own.is_dir() } else { !self.system.stops() };
-                let sent = goes && self.sheet(&self.bytes(sheets, index)?, checked, &own, number)?;
+                let sent = goes && self.sheet(&bytes, &checked[index], &own, number)?;
                 if !sent {
-                    // Of a job without a printed sheet there is nothing to remember: if it is started again, it begins anew.
+                    // Of a job without a printed sheet there is nothing to remember: if it is started again,
+                    // it begins anew.
                     // One that was only stopped goes on after its printed sheets.
                     if self.has_ended(&own) && (number == 1 || (self.given_up)()) {
                         forget_folder(&folder, self.messages);
@@ -301,7 +315,8 @@ impl Backend<'_> {
         }
     }
 
-    /// Keeps a sheet as a file in a folder. Its name says which it is, so a sheet that is there is not written again.
+    /// Keeps a sheet as a file in a folder. Its name says which it is, so a sheet that is there is not
+    /// written again.
     fn to_file(&self, bytes: &[u8], to: &Path, number: usize) -> Result<bool, Stopped> {
         let path = to.join(format!("{}-{number:04}.rgl", self.call.identity));
         let kept = || {
@@ -310,7 +325,10 @@ impl Backend<'_> {
         };
         match kept() {
             Ok(()) => Ok(true),
-            Err(error) => Err(self.fail(Exit::Stop, &format!("cannot write {}: {error}", path.display()))),
+            Err(error) => {
+                self.lacks_space(&error);
+                Err(self.fail(Exit::Stop, &format!("cannot write {}: {error}", path.display())))
+            }
         }
     }
 
@@ -330,7 +348,8 @@ impl Backend<'_> {
         }
     }
 
-    /// Sends a sheet to a device that tells nothing. Beside it stands whether it was begun and whether it was sent.
+    /// Sends a sheet to a device that tells nothing. Beside it stands whether it was begun and whether it was
+    /// sent.
     fn to_device(&self, job: Job<'_>, device: &Path, folder: &Path) -> Result<bool, Stopped> {
         let (begun, done) = (folder.join("begun"), folder.join("done"));
         if done.exists() {
@@ -349,6 +368,7 @@ impl Backend<'_> {
         self.system.notes_its_begin_in(&begun);
         let sent = self.delivery.send_raw(job, device);
         let cannot = |error: io::Error| {
+            self.lacks_space(&error);
             let folder = folder.display();
             self.fail(Exit::Stop, &format!("cannot keep the job's record in {folder}: {error}"))
         };
@@ -372,9 +392,17 @@ impl Backend<'_> {
         }
     }
 
+    /// Tells that the disk is full, if that is why something failed.
+    fn lacks_space(&self, error: &(dyn std::error::Error + 'static)) {
+        if is_full(error) {
+            self.messages.reasons(&[Reason::SpoolAreaFull]);
+        }
+    }
+
     /// What the print system is to do about a failure.
     fn failed(&self, failure: Failure, folder: &Path) -> Stopped {
         let text = observe::with_causes(&failure);
+        self.lacks_space(&failure);
         match failure {
             failure
                 if self.call.in_class && (failure.may_pass() || matches!(failure, Failure::ResetOwed(_))) =>

@@ -34,11 +34,13 @@ pub enum Reason {
     SupplyEmpty,
     /// A cartridge is needed that is not loaded.
     SupplyMissing,
+    /// The disk of this computer is full.
+    SpoolAreaFull,
     /// Something else that needs the operator.
     Other,
 }
 
-const ALL: [Reason; 9] = [
+const ALL: [Reason; 10] = [
     Reason::Connecting,
     Reason::OffLine,
     Reason::MediaEmpty,
@@ -47,6 +49,7 @@ const ALL: [Reason; 9] = [
     Reason::CoverOpen,
     Reason::SupplyEmpty,
     Reason::SupplyMissing,
+    Reason::SpoolAreaFull,
     Reason::Other,
 ];
 
@@ -62,6 +65,7 @@ impl Reason {
             Reason::CoverOpen => "cover-open-error",
             Reason::SupplyEmpty => "marker-supply-empty-error",
             Reason::SupplyMissing => "marker-supply-missing-warning",
+            Reason::SpoolAreaFull => "spool-area-full",
             Reason::Other => "other-error",
         }
     }

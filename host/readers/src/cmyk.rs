@@ -1,7 +1,7 @@
 //! CMYK JPEG: four plates.
 //!
-//! Problem: a CMYK picture states how much of four inks to print, not what colour results. Its profile, if it has one,
-//! describes another printer's inks.
+//! Problem: a CMYK picture states how much of four inks to print, not what colour results. Its profile, if it
+//! has one, describes another printer's inks.
 //! Method: each plate becomes a plane. Adobe stores inverted values, where 0 is full ink, and all programs
 //! that write such files do the same. YCCK is the same picture with cyan, magenta and yellow as a luminance
 //! and two differences. Cost: the file in memory, and five bytes a pixel. Limits: baseline and progressive
@@ -85,12 +85,19 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// 16 x 8 pixels written by libjpeg (through Pillow): the left half 200, 0, 40, 20 of 255 in cyan, magenta, yellow and
-    /// black; the right half is bare.
+    /// 16 x 8 pixels written by libjpeg (through Pillow): the left half 200, 0, 40, 20 of 255 in cyan,
+    /// magenta, yellow and black; the right half is bare.
     const CMYK: &[u8] = include_bytes!("cmyk.jpg");
 
     fn request<'a>() -> Request<'a> {
-        Request { page: None, planes: Some(&|_| false), pixels: 1 << 20, room: "a test", besides: "" }
+        Request {
+            page: None,
+            planes: Some(&|_| false),
+            pixels: 1 << 20,
+            finest: None,
+            room: "a test",
+            besides: "",
+        }
     }
 
     fn planes(bytes: &[u8]) -> Vec<Vec<u8>> {
@@ -121,7 +128,8 @@ mod tests {
         let mut ycck = CMYK.to_vec();
         assert_eq!(ycck[at], 0);
         ycck[at] = 2;
-        // By T.871: 55 + 1.402 x 87 = 177, 55 - 0.344 x 127 - 0.714 x 87 < 0, 55 + 1.772 x 127 > 255. The right half, all
+        // By T.871: 55 + 1.402 x 87 = 177, 55 - 0.344 x 127 - 0.714 x 87 < 0, 55 + 1.772 x 127 > 255. The
+        // right half, all
         // 255, is 255 + 1.402 x 127 and more in red and blue, and 255 - 1.058 x 127 = 120.5 in green.
         let planes = planes(&ycck);
         for (plane, (left, right)) in planes.iter().zip([(177, 255), (0, 121), (255, 255), (20, 0)]) {

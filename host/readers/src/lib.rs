@@ -26,6 +26,7 @@ pub mod profile;
 mod read;
 mod request;
 pub mod resolution;
+mod shrunk;
 mod stored;
 mod tiff;
 mod turn;

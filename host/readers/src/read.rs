@@ -20,7 +20,7 @@ use crate::picture::{Picture, Raster};
 use crate::request::{CUT_SHORT, Request, reduced, whole_jpeg};
 use crate::resolution::{self, Dpi};
 use crate::turn::Turn;
-use crate::{Bounds, cmyk, foreign, jpeg, tiff};
+use crate::{Bounds, cmyk, foreign, jpeg, shrunk, tiff};
 
 /// What reading a header may take: profiles and previews are smaller.
 const MOST_OF_HEADER: u64 = 1 << 26;
@@ -79,13 +79,29 @@ pub fn read(mut bytes: Vec<u8>, name: &Path, request: &Request<'_>) -> Result<Pi
     let profile = opened.profile();
     let turn = Turn(opened.orientation());
     let resolution = turn.dpi(resolution::of_file(&bytes, format));
-    let mut image = opened.decode().map_err(bad)?;
-    image.apply_orientation(turn.0);
+    let (stored, kind) = (opened.size(), opened.colour());
+    let finest = request.finest.map(|finest| turn.size(finest));
+    let to = finest.map(|finest| (finest.0.clamp(1, stored.0), finest.1.clamp(1, stored.1)));
+    let (colours, size) = match to.filter(|to| *to != stored) {
+        Some(to) => {
+            let rows = (format == ImageFormat::Png).then(|| shrunk::png(&bytes, to)).flatten();
+            let raster = match rows {
+                Some(raster) => raster,
+                None => shrunk::whole(&Raster::from(opened.decode().map_err(bad)?), stored, to),
+            };
+            (turn.raster(raster, to), turn.size(to))
+        }
+        None => {
+            let mut image = opened.decode().map_err(bad)?;
+            image.apply_orientation(turn.0);
+            let size = (image.width(), image.height());
+            (Raster::from(image), size)
+        }
+    };
+    let colours = Some(colours);
     let gamma = if format == ImageFormat::Png { crate::gamma(&bytes) } else { None };
-    let deep = image.color().bits_per_pixel() == 16 * u16::from(image.color().channel_count());
+    let deep = kind.bits_per_pixel() == 16 * u16::from(kind.channel_count());
     let notes = if deep { vec![reduced(name)] } else { Vec::new() };
-    let size = (image.width(), image.height());
-    let colours = Some(Raster::from(image));
     Ok(Picture { name: name.into(), size, planes: Vec::new(), colours, resolution, profile, gamma, notes })
 }
 
@@ -178,8 +194,14 @@ mod tests {
     use super::*;
     use crate::{Pixel, png};
 
-    const ASKED: Request<'static> =
-        Request { page: None, planes: None, pixels: 100, room: "ten by ten", besides: " or SVG" };
+    const ASKED: Request<'static> = Request {
+        page: None,
+        planes: None,
+        pixels: 100,
+        finest: None,
+        room: "ten by ten",
+        besides: " or SVG",
+    };
 
     fn refused(bytes: &[u8], name: &str) -> String {
         read(bytes.to_vec(), Path::new(name), &ASKED).unwrap_err().to_string()

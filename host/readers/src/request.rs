@@ -16,6 +16,9 @@ pub struct Request<'a> {
     pub planes: Option<&'a dyn Fn(&str) -> bool>,
     /// The most pixels.
     pub pixels: u64,
+    /// The most pixels across and down that the caller can use: colours that are finer are averaged while
+    /// they are read. Planes are left as they are.
+    pub finest: Option<(u32, u32)>,
     /// What has so many pixels, in words.
     pub room: &'static str,
     /// Formats that the caller reads by other means, in words.

@@ -44,19 +44,24 @@ fn bare(host: &str) -> &str {
 /// Whether `host` is one of the names of this computer.
 pub fn is_own(host: &str, names: &[String]) -> bool {
     let host = bare(host).trim_end_matches('.');
-    host.parse::<IpAddr>().is_ok()
+    // Behind a percent sign an address may name the interface through which it is reached.
+    let address = host.split('%').next().unwrap_or(host);
+    address.parse::<IpAddr>().is_ok()
         || host.eq_ignore_ascii_case("localhost")
         || names.iter().any(|name| name.eq_ignore_ascii_case(host))
 }
 
-/// Whether a request is meant for this server, and no foreign page has sent it.
+/// Whether a request is meant for this server, and no foreign page has sent it. IPP that no page has sent may
+/// call this computer by any name that leads here.
 ///
 /// # Errors
 /// Why it is refused.
-pub fn check(asked: &Asked<'_>, names: &[String]) -> Result<(), &'static str> {
+pub fn check(asked: &Asked<'_>, names: &[String], is_ipp: bool) -> Result<(), &'static str> {
     let host = asked.host.ok_or("the request names no host")?;
-    if !is_own(host, names) {
-        return Err("the request is for a host of another name");
+    if !(is_own(host, names) || is_ipp && asked.origin.is_none()) {
+        return Err(
+            "the request is for a host of another name; `foilpress serve --name` adds names of this computer",
+        );
     }
     match asked.origin {
         None => Ok(()),
@@ -98,6 +103,8 @@ pub enum Route {
     Lay,
     /// Somebody says which sheet is loaded.
     Load,
+    /// Somebody has switched the printer off and on.
+    Switched,
 }
 
 /// Everything that can be asked for.
@@ -165,7 +172,7 @@ pub fn who(deed: Deed) -> Who {
             | Operation::ReleaseJob
             | Operation::CloseJob,
         ) => Who::Owner,
-        Deed::Desk(Route::Load) | Deed::Ipp(Operation::CancelJobs) => Who::Keeper,
+        Deed::Desk(Route::Load | Route::Switched) | Deed::Ipp(Operation::CancelJobs) => Who::Keeper,
     }
 }
 
@@ -284,7 +291,7 @@ mod tests {
     fn only_own_names_and_own_pages_are_answered() {
         fn allowed(host: Option<&str>, origin: Option<&str>) -> bool {
             let names = ["workshop".to_owned(), "workshop.local".to_owned()];
-            check(&asked(host, origin), &names).is_ok()
+            check(&asked(host, origin), &names, false).is_ok()
         }
         for host in [
             "localhost",
@@ -292,6 +299,7 @@ mod tests {
             "127.0.0.1:8631",
             "[::1]:8631",
             "[fe80::1]",
+            "[fe80::1%25eth0]:8631",
             "192.168.1.5",
             "Workshop.local:8631",
             "workshop.local.",
@@ -307,6 +315,9 @@ mod tests {
             assert!(!allowed(Some(host), Some(&format!("http://{host}"))), "{host}");
         }
         assert!(!allowed(None, None));
+        // A program that prints has no page; a page that pretends to be one has its origin.
+        let foreign = |origin| check(&asked(Some("printer.lan"), origin), &[], true).is_ok();
+        assert!(foreign(None) && !foreign(Some("http://printer.lan")) && !foreign(Some("null")));
         for origin in [
             "null",
             "http://evil.example",
@@ -330,7 +341,7 @@ mod tests {
         }
     }
 
-    const ROUTES: [Route; 14] = [
+    const ROUTES: [Route; 15] = [
         Route::Page,
         Route::Script,
         Route::Style,
@@ -345,6 +356,7 @@ mod tests {
         Route::Cancel,
         Route::Lay,
         Route::Load,
+        Route::Switched,
     ];
 
     /// Deeds by the letters that whoever wrote the rule gave them: all may, owner and keeper, keeper alone.
@@ -354,7 +366,7 @@ mod tests {
         match name {
             "Plan" | "Preview" | "Release" | "Hold" | "Cancel" | "Lay" => 'o',
             "SendDocument" | "CancelJob" | "HoldJob" | "ReleaseJob" | "CloseJob" => 'o',
-            "Load" | "CancelJobs" => 'k',
+            "Load" | "Switched" | "CancelJobs" => 'k',
             _ => 'a',
         }
     }

@@ -87,13 +87,13 @@ pub struct Advert {
 }
 
 impl Advert {
-    /// Announces printers with their identities at a port of a computer, through the interfaces for which `leads_out` is true.
+    /// Announces printers with their identities at a port of a computer, which dialogs call something, through the interfaces for which `leads_out` is true.
     ///
     /// # Errors
     /// The system does not let us answer, or a name is none.
     pub fn begin(
         printers: &[(Preset, String)],
-        computer: &str,
+        (computer, called): (&str, &str),
         port: u16,
         leads_out: fn(&str) -> bool,
     ) -> Result<Advert, mdns_sd::Error> {
@@ -105,7 +105,7 @@ impl Advert {
             for (printer, uuid) in printers {
                 for kind in TYPES {
                     let service = format!("{subtype}._sub.{kind}._tcp.local.");
-                    let (name, host) = (title(&printer.name, computer), format!("{computer}.local."));
+                    let (name, host) = (title(&printer.name, called), format!("{computer}.local."));
                     let keys = keys(printer, uuid);
                     let info =
                         ServiceInfo::new(&service, &name, &host, "", port, &keys[..])?.enable_addr_auto();

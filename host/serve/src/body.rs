@@ -139,13 +139,13 @@ pub async fn keep(
     Ok(block_in_place(|| spool.end()))
 }
 
-/// Reads on for a while: a client that is still sending would not see its answer.
+/// Reads on to the end: a client that is still sending would not see its answer. It has the time that a
+/// document has, and may send as much.
 pub async fn drain(body: &mut Incoming, limits: &Limits) {
-    const MOST: usize = 4 << 20;
-    let mut read = 0;
+    let (mut came, start) = (0, Instant::now());
     while let Ok(Some(bytes)) = piece(body, limits).await {
-        read += bytes.len();
-        if read > MOST {
+        came += bytes.len() as u64;
+        if came > limits.document || start.elapsed() > limits.body + Duration::from_secs(came / limits.pace) {
             return;
         }
     }

@@ -26,7 +26,8 @@ use crate::jobs::{Job, Owner, State};
 use crate::operations;
 use crate::server::{ChangeError, Data, Server, key};
 use crate::spool::{Kind, Packing, Spool, SpoolError};
-use crate::template::{AUTO, Loaded, SHEETS, Ticket, keyword_of, size_of};
+use crate::template::{AUTO, Ticket, keyword_of, label, sheets, size_of};
+use crate::values::clean;
 use crate::worker;
 use device::encodings;
 use device::ledger::{Ledger, totals};
@@ -34,9 +35,10 @@ use make::options::of_attribute;
 use press::preview::inks::{Ground, sheet_in_inks};
 use press::simulate::{Setup, print};
 use protocol::ink::Ink;
+use queue::backend::Sheets as _;
 
 /// The routes there are.
-const ROUTES: [(Method, &str, Route); 14] = [
+const ROUTES: [(Method, &str, Route); 15] = [
     (Method::GET, "/", Route::Page),
     (Method::GET, "/desk.js", Route::Script),
     (Method::GET, "/desk.css", Route::Style),
@@ -51,6 +53,7 @@ const ROUTES: [(Method, &str, Route); 14] = [
     (Method::POST, "/desk/cancel", Route::Cancel),
     (Method::POST, "/desk/lay", Route::Lay),
     (Method::POST, "/desk/load", Route::Load),
+    (Method::POST, "/desk/switched", Route::Switched),
 ];
 
 /// What is asked for by this method at this path.
@@ -68,7 +71,7 @@ pub fn act(server: &Server, permit: &Permit<Route>, query: &str, asker: &Asker) 
     let file = |kind: &'static str, bytes: &'static [u8]| plain(StatusCode::OK, kind, bytes);
     let told = |done: Result<Value, String>| match done {
         Ok(value) => plain(StatusCode::OK, "application/json", value.to_string()),
-        Err(why) => words(StatusCode::UNPROCESSABLE_ENTITY, &why),
+        Err(why) => words(StatusCode::UNPROCESSABLE_ENTITY, &server.without_places(&why)),
     };
     let done = match permit.asked() {
         Route::Page => return file("text/html; charset=utf-8", include_bytes!("desk/desk.html")),
@@ -95,10 +98,11 @@ pub fn act(server: &Server, permit: &Permit<Route>, query: &str, asker: &Asker) 
         // It comes with its body, which `upload` reads.
         Route::Upload => return words(StatusCode::BAD_REQUEST, "the request has no document"),
         Route::Load => {
-            let size = parameter(query, "size").as_deref().and_then(size_of).ok_or(ChangeError::Sheet);
-            let kind = parameter(query, "kind").unwrap_or_else(|| AUTO.into());
-            size.and_then(|size| server.load(Loaded { size, kind }))
+            let size = parameter(query, "size").map(|size| size_of(&size).ok_or(ChangeError::Sheet));
+            let kind = parameter(query, "kind");
+            size.transpose().and_then(|size| server.load((size, kind), number(query, "revision")))
         }
+        Route::Switched => server.switched(),
         Route::Lay => server.lay_on_loaded(job),
         Route::Cancel => server.cancel(job),
         Route::Hold => server.hold(job),
@@ -106,7 +110,7 @@ pub fn act(server: &Server, permit: &Permit<Route>, query: &str, asker: &Asker) 
     };
     match done {
         Ok(()) => words(StatusCode::OK, "done"),
-        Err(error) => words(StatusCode::CONFLICT, &with_causes(&error)),
+        Err(error) => words(StatusCode::CONFLICT, &server.without_places(&with_causes(&error))),
     }
 }
 
@@ -140,7 +144,9 @@ pub async fn upload(
     let created = || server.create(printer, &name, owner.clone(), waiting());
     let id = match tokio::task::block_in_place(created) {
         Ok(id) => id,
-        Err(error) => return words(StatusCode::SERVICE_UNAVAILABLE, &with_causes(&error)),
+        Err(error) => {
+            return words(StatusCode::SERVICE_UNAVAILABLE, &server.without_places(&with_causes(&error)));
+        }
     };
     let _receives = server.receives(id);
     let (folder, room) = (server.store.folder(id), |octets| server.reserve(id, octets));
@@ -151,7 +157,7 @@ pub async fn upload(
     };
     tokio::task::block_in_place(|| match held(server, id, kept) {
         Ok(()) => plain(StatusCode::OK, "application/json", made(id, &owner).to_string()),
-        Err(why) => words(StatusCode::UNPROCESSABLE_ENTITY, &why),
+        Err(why) => words(StatusCode::UNPROCESSABLE_ENTITY, &server.without_places(&why)),
     })
 }
 
@@ -201,9 +207,8 @@ fn chart(server: &Server, query: &str, from: IpAddr) -> Result<Value, String> {
 
 /// What a held job would print: its passes and the ribbon they take, and a preview of its first sheet.
 fn plan(server: &Server, id: u32) -> Result<Value, String> {
-    worker::prepare(server, id)?;
-    let sheets = worker::Folder::of(&server.store.sheets(id));
-    let bytes = queue::backend::Sheets::sheet(&sheets, 0).map_err(|error| error.to_string())?;
+    let sheets = worker::prepare(server, id)?;
+    let bytes = sheets.sheet(0).map_err(|error| error.to_string())?.ok_or("there is no sheet")?;
     let checked = encodings::check(&bytes, &Silent).map_err(|error| with_causes(&error))?;
     let printout = print(&bytes, &Setup::default(), &Silent).map_err(|error| with_causes(&error))?;
     let printed = printout.sheet().map_err(|error| with_causes(&error))?;
@@ -229,7 +234,7 @@ fn plan(server: &Server, id: u32) -> Result<Value, String> {
     Ok(json!({ "job": id, "sheets": total, "passes": passes, "note": note }))
 }
 
-/// The value of a parameter in an address, without control characters.
+/// The value of a parameter in an address, [clean].
 fn parameter(query: &str, name: &str) -> Option<String> {
     let value = query.split('&').find_map(|pair| pair.strip_prefix(name)?.strip_prefix('='))?;
     let mut bytes = Vec::new();
@@ -243,8 +248,7 @@ fn parameter(query: &str, name: &str) -> Option<String> {
             byte => byte,
         });
     }
-    let text: String = String::from_utf8(bytes).ok()?.chars().filter(|c| !c.is_control()).take(200).collect();
-    Some(text)
+    Some(clean(&String::from_utf8(bytes).ok()?).chars().take(200).collect())
 }
 
 /// A parameter that is a number.
@@ -262,7 +266,7 @@ fn describe(server: &Server, asker: &Asker) -> Value {
         .map(|printer| json!({ "name": printer.name, "about": printer.about }))
         .collect();
     let sizes: Vec<Value> =
-        SHEETS.iter().map(|(keyword, paper)| json!({ "keyword": keyword, "label": paper.name() })).collect();
+        sheets().map(|(keyword, size)| json!({ "keyword": keyword, "label": label(size) })).collect();
     let types: Vec<Value> = std::iter::once((AUTO, "As the preset says"))
         .chain(of_attribute("media-type").map(|(keyword, value)| (keyword, value.help)))
         .map(|(keyword, label)| json!({ "keyword": keyword, "label": label }))
@@ -283,7 +287,9 @@ fn describe(server: &Server, asker: &Asker) -> Value {
         "charts": charts,
         "sizes": sizes,
         "types": types,
-        "loaded": { "size": keyword_of(loaded.size), "kind": loaded.kind },
+        "loaded": { "size": keyword_of(loaded.size), "kind": loaded.kind, "revision": data.revision() },
+        "await_switch": data.await_switch().count(),
+        "aside": if asker.is_keeper { data.aside.clone() } else { Vec::new() },
         "state": {
             "message": data.said(),
             "reasons": data.keywords(),
@@ -362,7 +368,7 @@ mod tests {
     fn parameters_are_read_as_browsers_write_them() {
         let query = "printer=decal&name=Blatt%20%C3%A4%0A.pdf&job=7";
         assert_eq!(parameter(query, "printer").as_deref(), Some("decal"));
-        assert_eq!(parameter(query, "name").as_deref(), Some("Blatt ä.pdf"));
+        assert_eq!(parameter(query, "name").as_deref(), Some("Blatt ä .pdf"));
         assert_eq!(number(query, "job"), Some(7));
         assert_eq!((parameter(query, "size"), parameter("name=%zz", "name")), (None, None));
     }

@@ -205,13 +205,16 @@ async fn respond(
     let header = |name: &HeaderName| request.headers().get(name).and_then(|value| value.to_str().ok());
     let (host, origin, code) = (header(&HOST), header(&ORIGIN), header(&CODE));
     let asked = Asked { peer, host, origin, code };
-    if let Err(why) = access::check(&asked, &server.settings.hosts) {
+    if request.headers().get_all(&HOST).iter().count() > 1 {
+        return words(StatusCode::BAD_REQUEST, "the request names two hosts");
+    }
+    let is_ipp = request.method() == Method::POST && header(&CONTENT_TYPE) == Some("application/ipp");
+    if let Err(why) = access::check(&asked, &server.settings.hosts, is_ipp) {
         return words(StatusCode::FORBIDDEN, why);
     }
     let is_keeper = access::is_keeper(&asked, &server.code());
     let from = peer.ip().to_canonical();
     let path = request.uri().path().to_owned();
-    let is_ipp = request.method() == Method::POST && header(&CONTENT_TYPE) == Some("application/ipp");
     if is_ipp {
         let host = host.unwrap_or_default().to_owned();
         let printer = path.trim_matches('/').strip_prefix("ipp/print").unwrap_or("");

@@ -1,10 +1,11 @@
 //! Jobs: what is known of them, and what stays known when the process is gone.
 //!
-//! Problem: a job that was accepted must be printed, once, whatever happens to the server meanwhile. Method: a folder for each job, with
-//! its record and its document; a change of the record is on disk before anybody is told of it ([`durable`]). A job that was on its way
-//! when the process ended is pending again: what of it is printed the delivery's own journal knows, so it goes on behind that.
-//! The order at the end of a job is: its end on record, then the journal's records of its sheets removed, then its document. So there is
-//! no step after which a restart would print it again.
+//! Problem: a job that was accepted must be printed, once, whatever happens to the server meanwhile. Method:
+//! a folder for each job, with its record and its document; a change of the record is on disk before anybody
+//! is told of it ([`durable`]). A job that was on its way when the process ended is pending again: what of it
+//! is printed the delivery's own journal knows, so it goes on behind that.
+//! The order at the end of a job is: its end on record, then the journal's records of its sheets removed,
+//! then its document. So there is no step after which a restart would print it again.
 //! Cost: two syncs for each change of a job's state. Limits: the records of the last hundred ended jobs stay.
 //! Source: RFC 8011, section 5.3.7, for the states.
 
@@ -18,12 +19,18 @@ use files::durable::{self, Access};
 use serde::{Deserialize, Serialize};
 
 use crate::budget::Client;
-use crate::template::Ticket;
+use crate::template::{AUTO, Ticket};
 
 /// Ended jobs whose records stay.
 const KEPT: usize = 100;
 /// A record is far smaller.
 const LARGEST_RECORD: u64 = 1 << 20;
+/// The version of records that this program writes and reads.
+const VERSION: u32 = 1;
+/// The folder of what cannot be read, beside the jobs.
+const ASIDE: &str = "aside";
+/// How the folders of drawn sheets begin.
+const SHEETS: &str = "sheets-";
 
 /// Where a job stands.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
@@ -70,9 +77,30 @@ impl Owner {
     }
 }
 
+/// The version of a record; another one is not read.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+#[serde(into = "u32", try_from = "u32")]
+pub struct Version;
+
+impl From<Version> for u32 {
+    fn from(Version: Version) -> u32 {
+        VERSION
+    }
+}
+
+impl TryFrom<u32> for Version {
+    type Error = String;
+
+    fn try_from(found: u32) -> Result<Version, String> {
+        if found == VERSION { Ok(Version) } else { Err(format!("it is of version {found}, not {VERSION}")) }
+    }
+}
+
 /// A job.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Job {
+    /// The version of this record.
+    pub version: Version,
     /// Its number.
     pub id: u32,
     /// The printer it was given to.
@@ -109,6 +137,8 @@ pub struct Job {
     pub laid: Vec<String>,
     /// Whether anything that is drawn was cut.
     pub is_cut: bool,
+    /// Whether it is held until the printer was switched off and on, or reset.
+    pub awaits_switch: bool,
 }
 
 impl Job {
@@ -138,28 +168,69 @@ pub struct Store {
     folder: PathBuf,
 }
 
+/// What was found on disk.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Found {
+    /// The jobs.
+    pub jobs: BTreeMap<u32, Job>,
+    /// What was put aside since it cannot be read: where it lies now, and why.
+    pub aside: Vec<(PathBuf, String)>,
+    /// The largest number that a job ever had here, as far as it is known.
+    pub last: u32,
+}
+
+/// Moves what cannot be read out of the way, under a name that nothing has there; where it lies now.
+///
+/// # Errors
+/// What the system says.
+pub(crate) fn put_aside(path: &Path, folder: &Path) -> io::Result<PathBuf> {
+    let aside = folder.join(ASIDE);
+    durable::make_folder(&aside, Access::Private)?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut names = std::iter::once(name.clone()).chain((2..).map(|again| format!("{name}-{again}")));
+    let to = names.find_map(|name| Some(aside.join(name)).filter(|to| !to.exists())).unwrap_or(aside);
+    fs::rename(path, &to)?;
+    durable::sync_folder(folder)?;
+    Ok(to)
+}
+
 impl Store {
-    /// Those in this folder, which is made if need be, with the records of those that can be read.
+    /// Those in this folder, which is made if need be. A job whose record cannot be read is put aside with
+    /// its document.
     ///
     /// # Errors
     /// The folder cannot be made or read.
-    pub fn open(folder: &Path) -> Result<(Store, BTreeMap<u32, Job>), StoreError> {
+    pub fn open(folder: &Path) -> Result<(Store, Found), StoreError> {
         durable::make_folder(folder, Access::Private).map_err(failed("make", folder))?;
         let store = Store { folder: folder.to_path_buf() };
-        let mut jobs = BTreeMap::new();
-        for entry in fs::read_dir(folder).map_err(failed("read", folder))? {
-            let path = entry.map_err(failed("read", folder))?.path();
-            let number = path.file_name().and_then(|name| name.to_str()?.parse::<u32>().ok());
-            let Some(number) = number else { continue };
+        let mut found = Found::default();
+        let number = |path: &Path| path.file_name().and_then(|name| name.to_str()?.parse::<u32>().ok());
+        let entries = |folder: &Path| -> Result<Vec<PathBuf>, StoreError> {
+            let entries = fs::read_dir(folder).map_err(failed("read", folder))?;
+            entries.map(|entry| Ok(entry.map_err(failed("read", folder))?.path())).collect()
+        };
+        for path in entries(folder)? {
+            let Some(number) = number(&path) else { continue };
+            found.last = found.last.max(number);
             match read(&path) {
-                Some(job) if job.id == number => {
-                    jobs.insert(number, job);
+                Ok(Some(job)) if job.id == number => {
+                    found.jobs.insert(number, job);
                 }
                 // Its owner was never told that it is here.
-                _ => store.clear(number, true)?,
+                Ok(None) => store.clear(number, true)?,
+                other => {
+                    let why = other.err().unwrap_or_else(|| "it is that of another job".into());
+                    let parent = folder.parent().unwrap_or(folder);
+                    let to = put_aside(&path, parent).map_err(failed("move", &path))?;
+                    found.aside.push((to, why));
+                }
             }
         }
-        Ok((store, jobs))
+        if let Ok(aside) = entries(&folder.with_file_name(ASIDE)) {
+            let name = |path: &Path| path.file_name()?.to_str()?.split('-').next()?.parse::<u32>().ok();
+            found.last = aside.iter().filter_map(|path| name(path)).max().unwrap_or(0).max(found.last);
+        }
+        Ok((store, found))
     }
 
     /// The folder of a job.
@@ -167,9 +238,11 @@ impl Store {
         self.folder.join(id.to_string())
     }
 
-    /// The folder of a job's drawn sheets.
-    pub fn sheets(&self, id: u32) -> PathBuf {
-        self.folder(id).join("sheets")
+    /// The folder of a job's drawn sheets. What is drawn for another sheet is elsewhere.
+    pub fn sheets(&self, job: &Job) -> PathBuf {
+        let (width, length) = job.ticket.size.unwrap_or_default();
+        let kind = job.ticket.kind.as_deref().unwrap_or(AUTO);
+        self.folder(job.id).join(format!("{SHEETS}{width}x{length}-{kind}"))
     }
 
     /// Makes a job's record durable.
@@ -184,7 +257,8 @@ impl Store {
         durable::write(&path, &text, Access::Private).map_err(failed("write", &path))
     }
 
-    /// Removes what a job that is over does not need any more: its document and its sheets; with `all` its record, too.
+    /// Removes what a job that is over does not need any more: its document and its sheets; with `all` its
+    /// record, too.
     ///
     /// # Errors
     /// The disk says no.
@@ -210,6 +284,17 @@ impl Store {
         Ok(())
     }
 
+    /// Removes the drawn sheets of a job: they can be drawn again.
+    pub fn clear_sheets(&self, id: u32) {
+        let entries = fs::read_dir(self.folder(id)).into_iter().flatten();
+        for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {
+            if path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(SHEETS)) {
+                // What stays is removed when the job is over.
+                let _ = fs::remove_dir_all(path);
+            }
+        }
+    }
+
     /// Forgets the oldest of the jobs that are over. The newest job stays, so that no number is given twice.
     ///
     /// # Errors
@@ -224,12 +309,18 @@ impl Store {
     }
 }
 
-fn read(folder: &Path) -> Option<Job> {
+/// The record in a job's folder; none if there is none.
+fn read(folder: &Path) -> Result<Option<Job>, String> {
     let path = folder.join("job.json");
-    if fs::metadata(&path).ok()?.len() > LARGEST_RECORD {
-        return None;
+    let length = match fs::metadata(&path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        found => found.map_err(|error| error.to_string())?.len(),
+    };
+    if length > LARGEST_RECORD {
+        return Err("its record is too large".into());
     }
-    serde_json::from_slice(&fs::read(path).ok()?).ok()
+    let text = fs::read(path).map_err(|error| error.to_string())?;
+    serde_json::from_slice(&text).map(Some).map_err(|error| format!("its record cannot be read: {error}"))
 }
 
 /// What becomes of a job when the server begins again.
@@ -254,6 +345,7 @@ mod tests {
     /// A job of this number in this state.
     fn job(id: u32, state: State) -> Job {
         Job {
+            version: Version,
             id,
             printer: "standard".into(),
             name: "leaf".into(),
@@ -272,14 +364,15 @@ mod tests {
             done: 0,
             laid: Vec::new(),
             is_cut: false,
+            awaits_switch: false,
         }
     }
 
     #[test]
     fn jobs_come_back_and_what_is_no_job_goes() {
         let folder = tempfile::tempdir().unwrap();
-        let (store, jobs) = Store::open(folder.path()).unwrap();
-        assert!(jobs.is_empty());
+        let (store, found) = Store::open(&folder.path().join("jobs")).unwrap();
+        assert_eq!(found, Found::default());
         for (id, state) in
             [(1, State::Completed), (2, State::Processing), (3, State::Incoming), (4, State::Held)]
         {
@@ -289,7 +382,31 @@ mod tests {
         // A folder that was made, and nothing in it was saved.
         fs::create_dir(store.folder(5)).unwrap();
         fs::write(store.folder(5).join("document.part"), "%P").unwrap();
-        let (store, mut jobs) = Store::open(folder.path()).unwrap();
+        // Records that are damaged, of another job, and of another version.
+        for (id, record) in [(7, "{"), (8, ""), (9, ""), (10, "")] {
+            store.save(&job(id, State::Pending)).unwrap();
+            let path = store.folder(id).join("job.json");
+            let text = fs::read_to_string(&path).unwrap();
+            let text = match id {
+                8 => text.replace("\"id\":8", "\"id\":1"),
+                9 => text.replace("\"version\":1", "\"version\":2"),
+                10 => text.replace("\"version\":1,", ""),
+                _ => record.into(),
+            };
+            fs::write(path, text).unwrap();
+            fs::write(store.folder(id).join("document.pdf"), "%PDF").unwrap();
+        }
+        let (store, Found { mut jobs, mut aside, last }) = Store::open(&folder.path().join("jobs")).unwrap();
+        aside.sort();
+        let whys: Vec<&str> = aside.iter().map(|(_, why)| why.as_str()).collect();
+        assert!(
+            whys[0].contains("missing field `version`") && whys[1].contains("cannot be read"),
+            "{whys:?}"
+        );
+        assert!(whys[2].contains("another job") && whys[3].contains("version 2, not 1"), "{whys:?}");
+        assert!(aside.iter().all(|(path, _)| path.join("document.pdf").exists()));
+        assert_eq!(last, 10);
+        assert_eq!(Store::open(&folder.path().join("jobs")).unwrap().1.last, 10);
         assert_eq!(jobs.keys().copied().collect::<Vec<_>>(), [1, 2, 3, 4]);
         assert!(!store.folder(5).exists());
         jobs.values_mut().for_each(|job| after_restart(job, 7));
@@ -302,7 +419,7 @@ mod tests {
     #[test]
     fn the_last_records_stay() {
         let folder = tempfile::tempdir().unwrap();
-        let (store, mut jobs) = Store::open(folder.path()).unwrap();
+        let (store, Found { mut jobs, .. }) = Store::open(folder.path()).unwrap();
         for id in 1..=KEPT as u32 + 3 {
             let state = if id == 2 { State::Held } else { State::Completed };
             store.save(&job(id, state)).unwrap();
@@ -311,6 +428,6 @@ mod tests {
         store.tidy(&mut jobs).unwrap();
         assert_eq!(jobs.len(), KEPT + 1);
         assert!(jobs.contains_key(&2) && !jobs.contains_key(&1) && !jobs.contains_key(&3));
-        assert_eq!(Store::open(folder.path()).unwrap().1, jobs);
+        assert_eq!(Store::open(folder.path()).unwrap().1.jobs, jobs);
     }
 }

@@ -23,6 +23,7 @@ use crate::spool::{KINDS, Kind, Packing, SpoolError};
 use crate::template::Ticket;
 use crate::values::{each, keyword, read_text};
 use crate::wire::{Operation, Place, Request, Response};
+use files::durable;
 
 /// What is to be done with the document behind a request.
 pub struct Incoming {
@@ -45,15 +46,18 @@ fn status(request: &Request, status: StatusCode, words: &str) -> Response {
     Response::new(&request.header, status).saying(words)
 }
 
-fn failed(request: &Request, error: &ChangeError) -> Response {
+fn failed(server: &Server, request: &Request, error: &ChangeError) -> Response {
     let code = match error {
         ChangeError::NoJob => StatusCode::ClientErrorNotFound,
-        ChangeError::State(_) => StatusCode::ClientErrorNotPossible,
+        ChangeError::State(_) | ChangeError::Stale => StatusCode::ClientErrorNotPossible,
         ChangeError::Share(_) => StatusCode::ServerErrorBusy,
         ChangeError::Sheet => StatusCode::ClientErrorAttributesOrValuesNotSupported,
+        ChangeError::Store(_) | ChangeError::Disk(_) if durable::is_full(error) => {
+            StatusCode::ServerErrorTemporaryError
+        }
         ChangeError::Store(_) | ChangeError::Disk(_) => StatusCode::ServerErrorInternalError,
     };
-    status(request, code, &observe::with_causes(error))
+    status(request, code, &server.without_places(&observe::with_causes(error)))
 }
 
 fn operation(request: &Request) -> Option<Operation> {
@@ -205,7 +209,9 @@ fn create(
     let named =
         |attribute: &str| request.operation(attribute).and_then(read_text).filter(|name| !name.is_empty());
     let name = named("job-name").or_else(|| named("document-name")).unwrap_or_else(|| "Untitled".into());
-    server.create(printer, &name, owner(place, request), ticket).map_err(|error| failed(request, &error))
+    server
+        .create(printer, &name, owner(place, request), ticket)
+        .map_err(|error| failed(server, request, &error))
 }
 
 /// Judges a request that may have a document, before the document is read.
@@ -266,6 +272,7 @@ pub fn arrived(
                 SpoolError::Kind => StatusCode::ClientErrorDocumentFormatNotSupported,
                 SpoolError::Empty => StatusCode::ClientErrorBadRequest,
                 SpoolError::Share(_) => StatusCode::ServerErrorBusy,
+                SpoolError::Disk(error) if durable::is_full(error) => StatusCode::ServerErrorTemporaryError,
                 SpoolError::Disk(_) => StatusCode::ServerErrorInternalError,
             };
             return status(request, code, &observe::with_causes(&error));
@@ -278,7 +285,7 @@ pub fn arrived(
     };
     match kept {
         Ok(()) => job_answer(server, place, request, id, &incoming.unsupported),
-        Err(error) => failed(request, &error),
+        Err(error) => failed(server, request, &error),
     }
 }
 
@@ -338,7 +345,8 @@ pub fn answer(server: &Server, place: &Place, request: &Request) -> Response {
 
 fn answered(server: &Server, place: &Place, request: &Request) -> Result<Response, Response> {
     let ok = || Response::new(&request.header, StatusCode::SuccessfulOk);
-    let change = |done: Result<(), ChangeError>| done.map(|()| ok()).map_err(|error| failed(request, &error));
+    let change =
+        |done: Result<(), ChangeError>| done.map(|()| ok()).map_err(|error| failed(server, request, &error));
     let Some(operation) = operation(request) else {
         return Err(status(
             request,
@@ -435,7 +443,7 @@ fn answered(server: &Server, place: &Place, request: &Request) -> Result<Respons
                 // One that has ended meanwhile is over all the same.
                 match server.cancel(id) {
                     Err(ChangeError::State(_) | ChangeError::NoJob) | Ok(()) => {}
-                    Err(error) => return Err(failed(request, &error)),
+                    Err(error) => return Err(failed(server, request, &error)),
                 }
             }
             Ok(ok())

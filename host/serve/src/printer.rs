@@ -12,8 +12,8 @@ use crate::budget::Client;
 use crate::server::{Cartridge, Preset, Server, identity};
 use crate::spool::KINDS;
 use crate::template::{
-    AUTO, MOST_COPIES, NO_ORIENTATION, ORIENTATIONS, OVERRIDES, QUALITIES, RESOLUTIONS, SHEETS, Size,
-    keyword_of, margins, paper, size, sizes, supported,
+    AUTO, MOST_COPIES, NO_ORIENTATION, ORIENTATIONS, OVERRIDES, QUALITIES, RESOLUTIONS, Size, keyword_of,
+    margins, paper, sheets, sizes, supported,
 };
 use crate::values::{
     charset, collection, date_time, dpi, integer, keyword, keywords, language, list, long_text, mime, name,
@@ -95,7 +95,7 @@ fn custom() -> [String; 2] {
 /// All margins there are on one side, the smallest first.
 fn margin(side: usize) -> IppValue {
     let (least, _) = sizes();
-    let sheets = SHEETS.iter().map(|(_, paper)| *paper).chain(paper(least));
+    let sheets = sheets().filter_map(|(_, size)| paper(size)).chain(paper(least));
     let mut all: Vec<i32> = sheets.map(|paper| margins(paper)[side]).collect();
     all.sort_unstable();
     all.dedup();
@@ -129,7 +129,7 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
         some => keywords(some),
     };
     let queued = data.jobs.values().filter(|job| !job.state.is_over() && job.printer == preset.name).count();
-    let names: Vec<String> = SHEETS.iter().map(|(keyword, _)| (*keyword).into()).collect();
+    let names: Vec<String> = sheets().map(|(keyword, _)| keyword.into()).collect();
     let media = names.iter().cloned().chain(custom());
     let mut formats: Vec<&str> = vec!["application/octet-stream"];
     KINDS.iter().for_each(|kind| {
@@ -203,7 +203,7 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
         (D, "printer-config-change-time", integer(data.configured.saturating_sub(began))),
         (D, "printer-current-time", date_time(crate::values::now())),
         (D, "printer-device-id", long_text(DEVICE_ID)),
-        (D, "printer-dns-sd-name", name(&title(&preset.name, server.settings.computer()))),
+        (D, "printer-dns-sd-name", name(&title(&preset.name, &server.settings.called()))),
         (D, "printer-geo-location", unknown()),
         (D, "printer-get-attributes-supported", keyword("document-format")),
         (D, "printer-icons", uri(&place.page("icon.png"))),
@@ -298,9 +298,8 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
             T,
             "media-col-database",
             list(
-                SHEETS
-                    .iter()
-                    .flat_map(|(_, sheet)| types().map(|kind| media_col(size(*sheet), Some(kind))))
+                sheets()
+                    .flat_map(|(_, size)| types().map(move |kind| media_col(size, Some(kind))))
                     .chain([media_col_range()]),
             ),
         ),
@@ -310,7 +309,7 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
                 ("x-dimension", range(least.0, most.0)),
                 ("y-dimension", range(least.1, most.1)),
             ]);
-            list(SHEETS.iter().map(|(_, paper)| media_size(size(*paper))).chain([any]))
+            list(sheets().map(|(_, size)| media_size(size)).chain([any]))
         }),
         (T, "media-left-margin-supported", margin(0)),
         (T, "media-top-margin-supported", margin(1)),

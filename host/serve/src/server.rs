@@ -1,7 +1,8 @@
 //! The server: its printers, its jobs, and what the one device behind them does.
 //!
-//! Method: one lock over all that changes. Whoever changes a job has it on disk before the lock is given back, so nobody is ever told of
-//! a state that a restart would undo. One thread prints ([`crate::worker`]); it is woken when there is something to do.
+//! Method: one lock over all that changes. Whoever changes a job has it on disk before the lock is given
+//! back, so nobody is ever told of a state that a restart would undo. One thread prints ([`crate::worker`]);
+//! it is woken when there is something to do.
 
 mod data;
 
@@ -15,8 +16,8 @@ pub use self::data::{Cartridge, Data, identities, identity};
 use self::data::{Kept, keep, kept};
 use crate::access::{Asker, Deed, Permit, Refused, permit};
 use crate::budget::{self, Client, Disk, Exceeded, Turns};
-use crate::jobs::{Job, Owner, State, Store, StoreError, after_restart};
-use crate::template::{Loaded, Ticket, paper, supported};
+use crate::jobs::{Found, Job, Owner, State, Store, StoreError, Version, after_restart};
+use crate::template::{Loaded, Size, Ticket, paper, supported};
 use crate::values::now;
 use device::connection::Destination;
 use device::printers::Printers;
@@ -25,6 +26,7 @@ use inks::Library;
 use make::options::Choices;
 use observe::Observer;
 use queue::backend;
+use queue::messages::Reason;
 
 /// A printer: a preset under a name.
 #[derive(Clone, Debug)]
@@ -51,6 +53,8 @@ pub struct Settings {
     pub devices: Printers,
     /// The names under which this computer is asked for.
     pub hosts: Vec<String>,
+    /// What this server is called where there are several.
+    pub instance: Option<String>,
 }
 
 impl Settings {
@@ -58,6 +62,16 @@ impl Settings {
     pub fn computer(&self) -> &str {
         self.hosts.first().map_or("localhost", |name| name.split('.').next().unwrap_or(name))
     }
+
+    /// The same, and which of its servers this is.
+    pub fn called(&self) -> String {
+        called(self.computer(), self.instance.as_deref())
+    }
+}
+
+/// What a computer is called in dialogs, and which of its servers.
+pub fn called(computer: &str, instance: Option<&str>) -> String {
+    [computer, instance.unwrap_or_default()].join(" ").trim_end().to_owned()
 }
 
 /// Why a server does not begin.
@@ -95,6 +109,9 @@ pub enum ChangeError {
     /// No such sheet.
     #[error("the printer does not take such a sheet")]
     Sheet,
+    /// Somebody else was faster.
+    #[error("somebody has changed it meanwhile; look at what it is now")]
+    Stale,
     /// The disk.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -137,7 +154,14 @@ impl Server {
         if lock.try_lock().is_err() {
             return Err(BeginError::Twice(settings.folder));
         }
-        let (store, mut jobs) = Store::open(&settings.folder.join("jobs"))?;
+        let (store, Found { mut jobs, aside: unread, last }) = Store::open(&settings.folder.join("jobs"))?;
+        let aside = unread.iter().map(|(path, why)| {
+            format!(
+                "a job could not be read ({why}) and lies in {}; nothing of it was printed since",
+                path.display()
+            )
+        });
+        let mut aside: Vec<String> = aside.collect();
         for job in jobs.values_mut() {
             let before = job.clone();
             after_restart(job, now());
@@ -149,9 +173,10 @@ impl Server {
             }
         }
         let disk = Disk::of_free(durable::free(&settings.folder));
-        let kept = kept(&settings.folder).map_err(file(&settings.folder))?;
+        let kept = kept(&settings.folder, &mut aside).map_err(file(&settings.folder))?;
+        aside.iter().for_each(|words| observer.note(words));
         let data = Data {
-            next: jobs.keys().next_back().map_or(1, |last| last + 1),
+            next: last + 1,
             takes_any_sheet: matches!(settings.to, Destination::File(_)),
             jobs,
             heard: BTreeMap::new(),
@@ -163,6 +188,8 @@ impl Server {
             percent: None,
             cartridges: Vec::new(),
             kept,
+            aside,
+            again: None,
             changed: now(),
             configured: now(),
             identify: 0,
@@ -256,6 +283,7 @@ impl Server {
         budget::job(client, data.open(), data.open_of(client))?;
         let id = data.next;
         let job = Job {
+            version: Version,
             id,
             printer: printer.name.clone(),
             name: name.into(),
@@ -274,6 +302,7 @@ impl Server {
             done: 0,
             laid: Vec::new(),
             is_cut: false,
+            awaits_switch: false,
         };
         self.store.save(&job)?;
         data.next += 1;
@@ -336,7 +365,8 @@ impl Server {
         is_first.then(|| Looks(self, client))
     }
 
-    /// A job's document comes, until what is given back is dropped. Time runs out between operations; each has limits of its own.
+    /// A job's document comes, until what is given back is dropped. Time runs out between operations; each
+    /// has limits of its own.
     pub fn receives(&self, id: u32) -> impl Drop + use<'_> {
         struct Receives<'a>(&'a Server, u32);
         impl Drop for Receives<'_> {
@@ -377,13 +407,14 @@ impl Server {
         data.jobs.remove(&id);
     }
 
-    /// Ends a job: at once if nothing of it is on its way, else as soon as the device allows. A sheet that is open at the bridge
-    /// from before a restart, or from before the job was held, is on its way.
+    /// Ends a job: at once if nothing of it is on its way, else as soon as the device allows. A sheet that is
+    /// open at the bridge from before a restart, or from before the job was held, is on its way. A full disk
+    /// hinders nobody.
     ///
     /// # Errors
     /// It is over, or there is none.
     pub fn cancel(&self, id: u32) -> Result<(), ChangeError> {
-        let over = self.change(id, |job| match job.state {
+        let cancel = |job: &mut Job| match job.state {
             state if state.is_over() => Err(ChangeError::State("over")),
             state if state == State::Processing || self.is_open(job) => {
                 if state == State::Held {
@@ -398,11 +429,83 @@ impl Server {
                 job.message = "cancelled".into();
                 Ok(true)
             }
-        })?;
+        };
+        let over = match self.change(id, cancel) {
+            Err(ChangeError::Store(_)) => {
+                let mut data = self.data();
+                let job = data.jobs.get_mut(&id).ok_or(ChangeError::NoJob)?;
+                if cancel(job)? {
+                    // Its document is removed first: that makes room, and then nothing can print it any more.
+                    let job = job.clone();
+                    self.store.clear(id, false)?;
+                    self.store.save(&job)?;
+                }
+                data.changed = now();
+                drop(data);
+                self.wake.notify_all();
+                false
+            }
+            changed => changed?,
+        };
         if over {
             self.store.clear(id, false)?;
         }
         Ok(())
+    }
+
+    /// A job is over. Where the disk is full, what is not needed any more makes room for its record: its
+    /// sheets, which can be drawn again, and of one that is not printed its document.
+    ///
+    /// # Errors
+    /// It cannot be kept all the same.
+    pub(crate) fn end(&self, id: u32, state: State, why: &str) -> Result<(), ChangeError> {
+        let end = |job: &mut Job| {
+            (job.state, job.ended) = (state, Some(now()));
+            job.message = why.into();
+            Ok(())
+        };
+        match self.change(id, end) {
+            Err(ChangeError::Store(error)) if durable::is_full(&error) => {
+                match state {
+                    State::Completed => self.store.clear_sheets(id),
+                    _ => self.store.clear(id, false)?,
+                }
+                self.change(id, end)
+            }
+            ended => ended,
+        }
+    }
+
+    /// Nothing is printed now.
+    pub(crate) fn rests(&self) {
+        let mut data = self.data();
+        data.percent = None;
+        data.message.clear();
+        data.reasons.clear();
+        data.changed = now();
+    }
+
+    /// A job that could not be kept waits again, and is tried after a while.
+    pub(crate) fn try_again(&self, id: u32, why: &str, reason: Reason, after: Duration) {
+        let mut data = self.data();
+        if let Some(job) = data.jobs.get_mut(&id).filter(|job| job.state == State::Processing) {
+            // On disk it is as it was, which a restart takes for the same.
+            (job.state, job.message) = (State::Pending, why.into());
+        }
+        data.message = why.into();
+        data.reasons = vec![reason];
+        data.again = Some(Instant::now() + after);
+        data.changed = now();
+    }
+
+    /// Words without the places of this computer's files, which guests need not know.
+    pub fn without_places(&self, text: &str) -> String {
+        let mut places = vec![(self.settings.folder.as_path(), "the server's folder")];
+        if let Destination::File(folder) = &self.settings.to {
+            places.insert(0, (folder, "the folder of sheets"));
+        }
+        let absolute = places.into_iter().filter(|(place, _)| place.is_absolute());
+        absolute.fold(text.to_owned(), |text, (place, name)| text.replace(&place.display().to_string(), name))
     }
 
     /// Holds a job that has not begun.
@@ -431,7 +534,7 @@ impl Server {
     pub fn release(&self, id: u32) -> Result<(), ChangeError> {
         self.change(id, |job| match job.state {
             State::Held => {
-                (job.state, job.ticket.held) = (State::Pending, false);
+                (job.state, job.ticket.held, job.awaits_switch) = (State::Pending, false, false);
                 job.message.clear();
                 Ok(())
             }
@@ -444,19 +547,43 @@ impl Server {
         })
     }
 
-    /// Somebody says which sheet is in the printer.
+    /// Somebody has switched the printer off and on: all jobs go on that were held for that.
     ///
     /// # Errors
-    /// The printer takes no such sheet, or it cannot be kept.
-    pub fn load(&self, loaded: Loaded) -> Result<(), ChangeError> {
+    /// One of them cannot be kept.
+    pub fn switched(&self) -> Result<(), ChangeError> {
+        let held: Vec<u32> = self.data().await_switch().map(|job| job.id).collect();
+        held.into_iter().try_for_each(|id| match self.release(id) {
+            Err(ChangeError::State(_) | ChangeError::NoJob) => Ok(()),
+            released => released,
+        })
+    }
+
+    /// Somebody says which sheet is in the printer, its size or kind or both. `seen` is the
+    /// [`Data::revision`] that they have looked at, if they have.
+    ///
+    /// # Errors
+    /// The printer takes no such sheet, somebody else has said something meanwhile, or it cannot be kept.
+    pub fn load(
+        &self,
+        (size, kind): (Option<Size>, Option<String>),
+        seen: Option<u32>,
+    ) -> Result<(), ChangeError> {
+        let mut data = self.data();
+        let revision = data.kept.revision;
+        if seen.is_some_and(|seen| seen != revision) {
+            return Err(ChangeError::Stale);
+        }
+        let is_any = size.is_some() || kind.is_some();
+        let Loaded { size: was, kind: of } = data.loaded().clone();
+        let loaded = Loaded { size: size.unwrap_or(was), kind: kind.unwrap_or(of) };
         let is_kind =
             loaded.kind == crate::template::AUTO || supported("media-type").any(|known| known == loaded.kind);
-        if paper(loaded.size).is_none() || !is_kind {
+        if paper(loaded.size).is_none() || !is_kind || !is_any {
             return Err(ChangeError::Sheet);
         }
-        let mut data = self.data();
-        let kept = Kept { loaded, ..data.kept.clone() };
-        keep(&self.settings.folder.join("server.json"), &kept).map_err(ChangeError::Disk)?;
+        let kept = Kept { loaded, revision: revision.wrapping_add(1), ..data.kept.clone() };
+        keep(&self.settings.folder, &kept).map_err(ChangeError::Disk)?;
         (data.kept, data.configured, data.changed) = (kept, now(), now());
         drop(data);
         // A job may have waited for it.
@@ -487,6 +614,10 @@ impl Server {
     pub fn next(&self) -> Job {
         let mut data = self.data();
         loop {
+            if let Some(left) = Server::pause(&mut data) {
+                data = self.wake.wait_timeout(data, left).unwrap_or_else(PoisonError::into_inner).0;
+                continue;
+            }
             let mut jobs = data.jobs.values();
             let open =
                 jobs.find(|job| matches!(job.state, State::Pending | State::Held) && self.is_open(job));
@@ -507,6 +638,15 @@ impl Server {
             }
             data = self.wake.wait(data).unwrap_or_else(PoisonError::into_inner);
         }
+    }
+
+    /// Until when nothing is tried, if that is not over.
+    fn pause(data: &mut Data) -> Option<Duration> {
+        let left = data.again.and_then(|again| again.checked_duration_since(Instant::now()));
+        if left.is_none() && data.again.take().is_some() {
+            data.reasons.clear();
+        }
+        left
     }
 
     /// Ends jobs that have waited so long for their document, and those that have lain so long on the desk

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use crate::budget::Exceeded;
 use files::durable;
-use flate2::write::{DeflateDecoder, GzDecoder, ZlibDecoder};
+use flate2::write::{DeflateDecoder, MultiGzDecoder, ZlibDecoder};
 
 /// How a document is packed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -112,7 +112,7 @@ enum Inflater {
     Deflate(Option<Limited>, Vec<u8>),
     Raw(DeflateDecoder<Limited>),
     Zlib(ZlibDecoder<Limited>),
-    Gzip(GzDecoder<Limited>),
+    Gzip(MultiGzDecoder<Limited>),
 }
 
 /// A document that is being kept.
@@ -133,7 +133,7 @@ impl Spool {
         let inflater = match packing {
             Packing::None => Inflater::Plain(out),
             Packing::Deflate => Inflater::Deflate(Some(out), Vec::new()),
-            Packing::Gzip => Inflater::Gzip(GzDecoder::new(out)),
+            Packing::Gzip => Inflater::Gzip(MultiGzDecoder::new(out)),
         };
         Ok(Spool { inflater, path })
     }

@@ -19,8 +19,8 @@ use press::layout::paper::{custom_margins, custom_range, sheet_mm, table};
 use queue::ppd::paper_of;
 use sheet::Turn;
 
-/// The sheets with a name, by the names of PWG 5101.1.
-pub const SHEETS: [(&str, Paper); 6] = [
+/// The sheets that have a name in the printer's table, too.
+const SHEETS: [(&str, Paper); 6] = [
     ("iso_a4_210x297mm", Paper::A4),
     ("na_letter_8.5x11in", Paper::Letter),
     ("na_legal_8.5x14in", Paper::Legal),
@@ -95,6 +95,12 @@ fn hundredths(mm: f64) -> i32 {
     number
 }
 
+/// The sheets with a name, by the names of PWG 5101.1: those, and the most usual one of photographs.
+pub fn sheets() -> impl Iterator<Item = (&'static str, Size)> {
+    let photo = ("na_index-4x6_4x6in", (10160, 15240));
+    SHEETS.into_iter().map(|(keyword, paper)| (keyword, size(paper))).chain([photo])
+}
+
 /// The size of a paper.
 pub fn size(paper: Paper) -> Size {
     let (width, length) = sheet_mm(paper);
@@ -124,8 +130,8 @@ pub fn paper(size: Size) -> Option<Paper> {
 
 /// The keyword of a sheet of this size.
 pub fn keyword_of(sheet: Size) -> String {
-    match SHEETS.iter().find(|(_, paper)| size(*paper) == sheet) {
-        Some((keyword, _)) => (*keyword).into(),
+    match sheets().find(|(_, size)| *size == sheet) {
+        Some((keyword, _)) => keyword.into(),
         None => {
             let mm = |side: i32| {
                 let text = format!("{}.{:02}", side / 100, side % 100);
@@ -144,10 +150,10 @@ pub fn label(sheet: Size) -> String {
     }
 }
 
-/// The size that a keyword names: one of [`SHEETS`], or the size at its end, such as `na_index-4x6_4x6in`.
+/// The size that a keyword names: one of [`sheets`], or the size at its end, such as `na_5x7_5x7in`.
 pub fn size_of(keyword: &str) -> Option<Size> {
-    if let Some((_, paper)) = SHEETS.iter().find(|(known, _)| *known == keyword) {
-        return Some(size(*paper));
+    if let Some((_, size)) = sheets().find(|(known, _)| *known == keyword) {
+        return Some(size);
     }
     let last = keyword.rsplit('_').next()?;
     let (sides, unit) = match (last.strip_suffix("mm"), last.strip_suffix("in")) {
@@ -396,8 +402,10 @@ mod tests {
         assert!(margins(Paper::Postcard)[1] < 310);
         let index = size_of("na_index-4x6_4x6in").unwrap();
         assert_eq!(index, (10160, 15240));
-        assert_eq!(keyword_of(index), "custom_101.6x152.4mm_101.6x152.4mm");
-        assert_eq!(size_of(&keyword_of(index)), Some(index));
+        assert_eq!(keyword_of(index), "na_index-4x6_4x6in");
+        let photo = size_of("na_5x7_5x7in").unwrap();
+        assert_eq!(keyword_of(photo), "custom_127x177.8mm_127x177.8mm");
+        assert_eq!(size_of(&keyword_of(photo)), Some(photo));
         for wrong in ["", "a4", "x_1e9x2mm", "x_-1x2mm", "x_NaNx2mm"] {
             assert_eq!(size_of(wrong), None, "{wrong}");
         }

@@ -33,8 +33,12 @@ pub fn acceptor(folder: &Path, hosts: &[String]) -> io::Result<TlsAcceptor> {
     let (key, certificate) = (folder.join("key.pem"), folder.join("certificate.pem"));
     let mut names: Vec<String> = hosts.to_vec();
     names.extend(["localhost".into(), "127.0.0.1".into(), "::1".into()]);
+    // The names stand before the certificate, where its readers do not look.
+    let header = format!("Names: {}\n", names.join(" "));
     let read = || match (std::fs::read(&key), std::fs::read(&certificate)) {
-        (Ok(key), Ok(certificate)) => config(&key, &certificate).ok(),
+        (Ok(key), Ok(certificate)) if certificate.starts_with(header.as_bytes()) => {
+            config(&key, &certificate).ok()
+        }
         _ => None,
     };
     let config = match read() {
@@ -42,7 +46,7 @@ pub fn acceptor(folder: &Path, hosts: &[String]) -> io::Result<TlsAcceptor> {
         None => {
             let pair = KeyPair::generate().map_err(other)?;
             let made = CertificateParams::new(names).map_err(other)?.self_signed(&pair).map_err(other)?;
-            let (key_text, text) = (pair.serialize_pem(), made.pem());
+            let (key_text, text) = (pair.serialize_pem(), header + &made.pem());
             // The certificate last: one without its key is none.
             durable::write(&key, key_text.as_bytes(), Access::Private)?;
             durable::write(&certificate, text.as_bytes(), Access::Private)?;
@@ -68,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_certificate_is_made_once_and_made_again_if_it_is_damaged() {
+    fn the_certificate_is_made_once_and_made_again_if_it_is_damaged_or_of_other_names() {
         let folder = tempfile::tempdir().unwrap();
         let read = || std::fs::read(folder.path().join("certificate.pem")).unwrap();
         acceptor(folder.path(), &["workshop.local".into()]).unwrap();
@@ -77,6 +81,9 @@ mod tests {
         assert_eq!(read(), first);
         std::fs::write(folder.path().join("key.pem"), "no key").unwrap();
         acceptor(folder.path(), &["workshop.local".into()]).unwrap();
-        assert_ne!(read(), first);
+        let second = read();
+        assert_ne!(second, first);
+        acceptor(folder.path(), &["workshop.local".into(), "printer.lan".into()]).unwrap();
+        assert_ne!(read(), second);
     }
 }

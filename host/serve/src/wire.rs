@@ -287,9 +287,17 @@ impl Request {
             }
             _ => return Err(bad("the charset is of another kind")),
         }
-        match language.value() {
-            IppValue::NaturalLanguage(_) => Ok(()),
-            _ => Err(bad("the language is of another kind")),
+        if !matches!(language.value(), IppValue::NaturalLanguage(_)) {
+            return Err(bad("the language is of another kind"));
+        }
+        let is_twice = |attributes: &[IppAttribute]| {
+            let mut names: Vec<&str> = attributes.iter().map(|a| a.name().as_str()).collect();
+            names.sort_unstable();
+            names.windows(2).any(|two| two[0] == two[1])
+        };
+        match self.attributes.groups().iter().any(|group| is_twice(group.attributes())) {
+            true => Err(bad("an attribute is there twice")),
+            false => Ok(()),
         }
     }
 

@@ -1,20 +1,25 @@
 //! Printing: from a job's document to its last sheet.
 //!
-//! Problem: a page costs 100 MB while it is drawn, a document has hundreds of them, and a sheet that was sent must not be sent again.
-//! Method: the filter of print queues draws the document ([`queue::filter`]); each sheet goes into a file as it is made. When all are
-//! there, that is put on record, and the delivery of print queues sends them one after the other ([`queue::backend`]). A job of
-//! finished sheets is taken apart instead of drawn. A restart draws again what was not all drawn, and goes on behind the last sheet
-//! that was sent.
+//! Problem: a page costs 100 MB while it is drawn, a document has hundreds of them, and a sheet that was sent
+//! must not be sent again.
+//! Method: the filter of print queues draws the document ([`queue::filter`]); each sheet goes into a file as
+//! it is drawn, and the delivery of print queues sends one after the other meanwhile ([`queue::backend`]).
+//! When all are drawn, that is put on record. A job of finished sheets is taken apart instead of drawn. A
+//! restart draws the document again, keeps the sheets that are there, and goes on behind the last one that
+//! was sent. What cannot be kept for want of space is tried again, and again.
 //! Cost: one page in memory; the sheets of one job on disk.
 //! Limits: one device, one job at a time.
 
 use std::borrow::Cow;
+use std::error::Error;
 use std::fs;
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::Duration;
 
-use files::durable::{self, Access};
+use files::durable::{self, Access, is_full};
 use observe::{Observer, with_causes};
 use press::inspect::sheets;
 use protocol::ink::Ink;
@@ -31,28 +36,48 @@ use queue::call::{Call, Exit};
 use queue::filter::{self, FilterError, Filtered};
 use queue::messages::{Reason, Report, colour};
 
+/// How long a job waits that could not be kept, at first and at most.
+const AGAIN: (Duration, Duration) = (Duration::from_secs(2), Duration::from_secs(30));
+
 /// Prints one job after the other, for ever.
 pub fn work(server: &Server) -> ! {
+    let mut again = AGAIN.0;
     loop {
         let job = server.next();
-        let ended = print(server, &job);
-        {
-            let mut data = server.data();
-            data.percent = None;
-            data.message.clear();
-            data.reasons.clear();
-            data.changed = now();
+        let voice = Voice { server, id: job.id };
+        let ended = print(server, &job, &voice);
+        server.rests();
+        let Err(why) = ended else {
+            again = AGAIN.0;
+            continue;
+        };
+        let (why, reason) = match why {
+            Unfinished::Full => (FULL.into(), Reason::SpoolAreaFull),
+            Unfinished::Record(error) => (with_causes(&error), Reason::Other),
+        };
+        if again == AGAIN.0 {
+            server.observer.note(&format!("job {}: {why}", job.id));
         }
-        if let Err(error) = ended {
-            // The job stays as it is on disk, and the next start takes it up.
-            server.observer.note(&format!("job {}: {}", job.id, with_causes(&error)));
-            std::thread::sleep(std::time::Duration::from_secs(2));
-        }
+        server.try_again(job.id, &server.without_places(&why), reason, again);
+        again = AGAIN.1.min(2 * again);
     }
 }
 
-fn print(server: &Server, job: &Job) -> Result<(), ChangeError> {
-    let voice = Voice { server, id: job.id, stage: Mutex::default() };
+/// Why a job is not over, and will be tried again.
+pub enum Unfinished {
+    /// The disk is full.
+    Full,
+    /// Its record cannot be kept.
+    Record(ChangeError),
+}
+
+impl From<ChangeError> for Unfinished {
+    fn from(error: ChangeError) -> Unfinished {
+        if is_full(&error) { Unfinished::Full } else { Unfinished::Record(error) }
+    }
+}
+
+fn print(server: &Server, job: &Job, voice: &Voice<'_>) -> Result<(), Unfinished> {
     let call = Call {
         title: job.name.clone(),
         identity: job.identity(),
@@ -65,134 +90,251 @@ fn print(server: &Server, job: &Job) -> Result<(), ChangeError> {
         listed: (String::new(), String::new()),
         lister: PathBuf::new(),
     };
-    let drawn = prepare_for(server, job.id, &voice, Purpose::Print);
-    // A sheet that is open at the bridge is ended there first, whatever became of the job.
-    if voice.is_cancelled() && !server.is_open(job) {
-        return end(server, &call, &voice, State::Canceled, "cancelled");
-    }
-    if let Err(why) = drawn {
-        return end(server, &call, &voice, State::Aborted, &why);
-    }
-    let folder = Folder::of(&server.store.sheets(job.id));
+    let job = fixed(server, job.id)?;
+    let making = Making::of(&server.store.sheets(&job));
     let stop = || voice.is_cancelled();
-    let (exit, whole) = backend::deliver(&call, &server.settings.devices, &folder, &voice, &stop, &stop);
-    match exit {
-        Exit::Ok if whole => end(server, &call, &voice, State::Completed, &voice.printed()),
-        Exit::Ok => end(server, &call, &voice, State::Canceled, "cancelled"),
-        Exit::Cancel => {
-            let why = voice.last();
-            end(server, &call, &voice, State::Aborted, &why)
+    let ((exit, whole), drawn) = thread::scope(|scope| {
+        let drawing = scope.spawn(|| draw_for(server, &job, voice, &making, Purpose::Print));
+        let sent = backend::deliver(&call, &server.settings.devices, &making, voice, &stop, &stop);
+        making.enough();
+        (sent, drawing.join().unwrap_or_else(|_| Err(Undrawn::Document("it cannot be drawn".into()))))
+    });
+    match (exit, drawn) {
+        (Exit::Ok, Err(_)) if voice.is_cancelled() => end(server, &call, voice, State::Canceled, "cancelled"),
+        (Exit::Ok, Err(Undrawn::Full)) => Err(Unfinished::Full),
+        (Exit::Ok, Err(Undrawn::Enough)) => Err(Unfinished::Record(ChangeError::State("not drawn"))),
+        (Exit::Ok, Err(Undrawn::Document(why))) => {
+            let why = unfinished(server, &job, &why);
+            end(server, &call, voice, State::Aborted, &why)
         }
+        (Exit::Ok, Ok(())) if whole => end(server, &call, voice, State::Completed, &voice.printed()),
+        (Exit::Ok, Ok(())) => end(server, &call, voice, State::Canceled, "cancelled"),
+        (Exit::Cancel, _) => end(server, &call, voice, State::Aborted, &voice.last()),
+        (Exit::Failed | Exit::Stop, _) if voice.lacks_space() => Err(Unfinished::Full),
         // Somebody has to do something first, and says so by releasing the job.
-        Exit::Failed | Exit::Hold | Exit::Stop => server.change(job.id, |job| {
+        (Exit::Failed | Exit::Hold | Exit::Stop, _) => Ok(server.change(job.id, |job| {
             (job.state, job.ticket.held) = (if job.cancel { State::Canceled } else { State::Held }, false);
+            job.awaits_switch = exit == Exit::Hold && !job.cancel;
             job.ended = job.cancel.then(now);
             Ok(())
-        }),
+        })?),
     }
 }
 
-/// The end of a job: on record first, then forgotten by the delivery.
-fn end(server: &Server, call: &Call, voice: &Voice<'_>, state: State, why: &str) -> Result<(), ChangeError> {
-    server.change(voice.id, |job| {
-        (job.state, job.ended) = (state, Some(now()));
-        job.message = why.into();
-        Ok(())
-    })?;
+/// Why a job ends of which some sheets are printed already.
+fn unfinished(server: &Server, job: &Job, why: &str) -> String {
+    let done = server.data().jobs.get(&job.id).map_or(0, |job| job.done);
+    let plural = |number: u32| if number == 1 { "sheet is" } else { "sheets are" };
+    let path = job.document.as_ref().map(|document| server.store.folder(job.id).join(document));
+    let pages = || match job.format.as_str() {
+        "application/pdf" => path.as_deref().and_then(art::pdf::page_count),
+        _ => None,
+    };
+    match done {
+        0 => why.into(),
+        done => match pages() {
+            Some(pages) => {
+                let chosen = (1..=pages).filter(|&page| is_chosen(&job.ticket.pages(), page)).count();
+                let all = u32::try_from(chosen).unwrap_or(u32::MAX).saturating_mul(job.ticket.copies);
+                format!("{done} of {all} {} printed; {why}", plural(all))
+            }
+            None => format!("{done} {} printed; {why}", plural(done)),
+        },
+    }
+}
+
+/// The end of a job: on record first, then forgotten by the delivery. Where the disk is full, what is not
+/// printed any more makes room for that.
+fn end(server: &Server, call: &Call, voice: &Voice<'_>, state: State, why: &str) -> Result<(), Unfinished> {
+    let why = server.without_places(why);
+    server.end(voice.id, state, &why)?;
     // What is still open, as at a bridge that is another one now, is ended before the next job there.
     if !backend::is_open(&call.to, &call.journal.join(&call.identity)) {
         backend::forget(call, voice);
     }
-    Ok(server.store.clear(voice.id, false)?)
+    Ok(server.store.clear(voice.id, false).map_err(ChangeError::from)?)
 }
 
-/// Makes the sheets of a job that waits, so that somebody can look at them.
+/// A job whose sheet is decided, as it is when the job is drawn first, and stays known.
+fn fixed(server: &Server, id: u32) -> Result<Job, ChangeError> {
+    let job = server.data().jobs.get(&id).cloned().ok_or(ChangeError::NoJob)?;
+    let ticket = job.ticket.clone().on(server.data().loaded());
+    if ticket == job.ticket {
+        return Ok(job);
+    }
+    server.change(id, |kept| {
+        (kept.ticket.size, kept.ticket.kind) = (ticket.size, ticket.kind.clone());
+        Ok(())
+    })?;
+    Ok(Job { ticket, ..job })
+}
+
+/// Makes the sheets of a job that waits, so that somebody can look at them; where they are.
 ///
 /// # Errors
 /// In words: why there are none.
-pub fn prepare(server: &Server, id: u32) -> Result<(), String> {
-    prepare_for(server, id, &Voice { server, id, stage: Mutex::default() }, Purpose::Look)
+pub fn prepare(server: &Server, id: u32) -> Result<Making, String> {
+    let job = fixed(server, id).map_err(|error| server.without_places(&with_causes(&error)))?;
+    let making = Making::of(&server.store.sheets(&job));
+    match draw_for(server, &job, &Voice { server, id }, &making, Purpose::Look) {
+        Ok(()) => Ok(making),
+        Err(Undrawn::Full) => Err(FULL.into()),
+        Err(Undrawn::Enough) => Err("the job is printed or cancelled".into()),
+        Err(Undrawn::Document(why)) => Err(server.without_places(&why)),
+    }
+}
+
+/// What is said where the disk is full.
+pub const FULL: &str = "the disk of the print server is full; it goes on when there is room";
+
+/// Why sheets are not all drawn.
+enum Undrawn {
+    /// The disk is full.
+    Full,
+    /// Nobody wants them any more.
+    Enough,
+    /// The document, in words.
+    Document(String),
+}
+
+impl Undrawn {
+    fn of(error: &(dyn Error + 'static)) -> Undrawn {
+        if is_full(error) { Undrawn::Full } else { Undrawn::Document(with_causes(error)) }
+    }
+}
+
+impl From<io::Error> for Undrawn {
+    fn from(error: io::Error) -> Undrawn {
+        match Undrawn::of(&error) {
+            Undrawn::Document(why) => Undrawn::Document(format!("cannot keep the job's sheets: {why}")),
+            full => full,
+        }
+    }
 }
 
 /// Makes the sheets of a job unless they are there, and puts on record that all of them are.
-fn prepare_for(server: &Server, id: u32, voice: &Voice<'_>, purpose: Purpose) -> Result<(), String> {
+fn draw_for(
+    server: &Server,
+    job: &Job,
+    voice: &Voice<'_>,
+    making: &Making,
+    purpose: Purpose,
+) -> Result<(), Undrawn> {
+    let _over = making.until_over();
     let turn = server.drawing.take(purpose);
-    let job = server.data().jobs.get(&id).cloned().ok_or("there is no such job")?;
-    if job.sheets.is_some() {
+    let known = server.data().jobs.get(&job.id).cloned();
+    let known = known.ok_or_else(|| Undrawn::Document("there is no such job".into()))?;
+    if known.sheets.is_some_and(|sheets| making.holds(sheets / job.ticket.copies.max(1))) {
         return Ok(());
     }
-    if job.state.is_over() || job.state == State::Incoming {
-        return Err("the job has no document that could be drawn".into());
+    if known.cancel || known.state.is_over() || known.state == State::Incoming {
+        return Err(Undrawn::Enough);
     }
-    // Which sheet that is, is decided when the job is drawn, and stays known.
-    let job = Job { ticket: job.ticket.on(server.data().loaded()), ..job };
-    let drawn = draw(server, &job, voice, &turn)?;
-    let count = Folder::of(&server.store.sheets(id)).files.len();
-    let kept = server.change(id, |kept| {
-        kept.sheets = Some(u32::try_from(count).unwrap_or(u32::MAX).saturating_mul(job.ticket.copies));
-        (kept.ticket.size, kept.ticket.kind) = (job.ticket.size, job.ticket.kind);
-        (kept.laid, kept.is_cut) = (drawn.laid, drawn.is_cut);
+    let drawn = draw(server, job, &mut SheetFiles { count: 0, making, voice, turn: &turn })?;
+    let count = u32::try_from(making.count()).unwrap_or(u32::MAX);
+    let kept = server.change(job.id, |kept| {
+        // Meanwhile somebody may have laid it on another sheet.
+        if kept.ticket == job.ticket {
+            kept.sheets = Some(count.saturating_mul(job.ticket.copies));
+            (kept.laid, kept.is_cut) = (drawn.laid, drawn.is_cut);
+        }
         Ok(())
     });
-    kept.map_err(|error| with_causes(&error))
+    kept.map_err(|error| Undrawn::of(&error))
 }
 
 /// Makes the sheets of a job, and says how its pages lie.
-fn draw(server: &Server, job: &Job, voice: &Voice<'_>, turn: &Turn<'_>) -> Result<Filtered, String> {
-    let text = |error: io::Error| format!("cannot keep the job's sheets: {error}");
-    let to = server.store.sheets(job.id);
-    match fs::remove_dir_all(&to) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(text(error)),
-        _ => {}
-    }
-    durable::make_folder(&to, Access::Private).map_err(text)?;
-    let document = job.document.as_deref().ok_or("the job has no document")?;
+fn draw(server: &Server, job: &Job, out: &mut SheetFiles<'_>) -> Result<Filtered, Undrawn> {
+    durable::make_folder(&out.making.folder, Access::Private)?;
+    let document = job.document.as_deref();
+    let document = document.ok_or_else(|| Undrawn::Document("the job has no document".into()))?;
     let path = server.store.folder(job.id).join(document);
-    let mut out = SheetFiles { folder: &to, count: 0, voice, turn };
+    let mut file = fs::File::open(&path)?;
     let mut drawn = Filtered::default();
     if job.format == JOB {
-        let bytes = fs::read(&path).map_err(text)?;
-        let (all, pages) = (sheets(&bytes), job.ticket.pages());
-        if !(1..=all.len()).any(|page| is_chosen(&pages, page)) {
-            return Err(FilterError::NotChosen(all.len()).to_string());
-        }
-        for (_, place) in (1..).zip(all).filter(|(page, _)| is_chosen(&pages, *page)) {
-            out.write_all(&bytes[place]).map_err(text)?;
-        }
+        finished(&mut file, &job.ticket.pages(), out)?;
     } else {
-        let preset = server
-            .printer(&job.printer)
-            .ok_or("its printer is not there any more; print it on another one")?;
-        let choices = job.ticket.choices(&preset.choices);
-        let file = fs::File::open(&path).map_err(text)?;
-        drawn = filter::run(file, Some(&path), &choices, &server.settings.library, &mut out, voice)
-            .map_err(|error| with_causes(&error))?;
+        let preset = server.printer(&job.printer).ok_or_else(|| {
+            Undrawn::Document("its printer is not there any more; print it on another one".into())
+        })?;
+        let (choices, voice) = (job.ticket.choices(&preset.choices), out.voice);
+        drawn = filter::run(file, Some(&path), &choices, &server.settings.library, out, voice)
+            .map_err(|error| out.why(Undrawn::of(&error)))?;
     }
     match out.count {
-        0 => Err("there is nothing to print: every page is blank".into()),
-        _ => durable::sync_folder(&to).map(|()| drawn).map_err(text),
+        0 => Err(Undrawn::Document("there is nothing to print: every page is blank".into())),
+        _ => Ok(drawn),
     }
 }
 
-/// Where the filter writes: each write is a sheet, and becomes a file.
+/// Takes a job of finished sheets apart, one in memory at a time.
+fn finished(
+    document: &mut dyn Read,
+    pages: &[std::ops::RangeInclusive<usize>],
+    out: &mut SheetFiles<'_>,
+) -> Result<(), Undrawn> {
+    let (mut bytes, mut seen, mut is_all) = (Vec::new(), 0, false);
+    while !is_all || !bytes.is_empty() {
+        let before = bytes.len();
+        // Twice as much each time: a sheet of unknown length is looked at no more than that often.
+        let more = document.take(before.max(1 << 20) as u64).read_to_end(&mut bytes)?;
+        is_all = more == 0;
+        let mut places = sheets(&bytes);
+        if !is_all {
+            // The last one may go on.
+            places.pop();
+        }
+        let end = places.last().map_or(0, |place| place.end);
+        for place in places.into_iter().filter(|place| !place.is_empty()) {
+            seen += 1;
+            if is_chosen(pages, seen) {
+                out.write_all(&bytes[place]).map_err(|error| out.why(error.into()))?;
+            }
+        }
+        bytes.drain(..end);
+    }
+    match out.count {
+        0 => Err(Undrawn::Document(FilterError::NotChosen(seen).to_string())),
+        _ => Ok(()),
+    }
+}
+
+/// Where the filter writes: each write is a sheet, and becomes a file unless it is there from an earlier
+/// time.
 struct SheetFiles<'a> {
-    folder: &'a Path,
     count: usize,
+    making: &'a Making,
     voice: &'a Voice<'a>,
     turn: &'a Turn<'a>,
 }
 
+impl SheetFiles<'_> {
+    /// Why nothing more is drawn: not for the document's sake if nobody wants it.
+    fn why(&self, why: Undrawn) -> Undrawn {
+        if self.is_enough() { Undrawn::Enough } else { why }
+    }
+
+    /// Whether nobody wants more.
+    fn is_enough(&self) -> bool {
+        self.voice.is_cancelled() || self.making.state().is_enough
+    }
+}
+
 impl Write for SheetFiles<'_> {
     fn write(&mut self, sheet: &[u8]) -> io::Result<usize> {
-        if self.voice.is_cancelled() {
-            return Err(io::Error::other("the job is cancelled"));
-        }
         // Meanwhile the job itself may have been printed.
         if self.turn.give_way() && !self.voice.waits() {
-            return Err(io::Error::other("the job is printed"));
+            self.making.enough();
+        }
+        if self.is_enough() {
+            return Err(io::Error::other("nobody wants it any more"));
         }
         self.count += 1;
-        durable::write(&self.folder.join(format!("{:05}.rgl", self.count)), sheet, Access::Private)?;
+        if self.count > self.making.count() {
+            let path = self.making.path(self.count);
+            durable::write(&path, sheet, Access::Private)?;
+            self.making.has(self.count);
+        }
         Ok(sheet.len())
     }
 
@@ -201,41 +343,89 @@ impl Write for SheetFiles<'_> {
     }
 }
 
-/// The sheets in a folder, in order.
-pub struct Folder {
-    files: Vec<PathBuf>,
+/// The sheets of a job in a folder, while they are made.
+pub struct Making {
+    folder: PathBuf,
+    state: Mutex<MakingState>,
+    more: Condvar,
 }
 
-impl Folder {
-    /// Those there are.
-    pub fn of(folder: &Path) -> Folder {
-        let mut files: Vec<PathBuf> = fs::read_dir(folder)
-            .into_iter()
-            .flatten()
-            .filter_map(|entry| Some(entry.ok()?.path()))
-            .filter(|path| path.extension().is_some_and(|ending| ending == "rgl"))
-            .collect();
-        files.sort();
-        Folder { files }
+#[derive(Default)]
+struct MakingState {
+    /// Sheets that are there.
+    count: usize,
+    /// Whether no more will come.
+    is_over: bool,
+    /// Whether nobody wants more.
+    is_enough: bool,
+}
+
+impl Making {
+    /// With those that are there.
+    fn of(folder: &Path) -> Making {
+        let making = Making { folder: folder.to_path_buf(), state: Mutex::default(), more: Condvar::new() };
+        let count = (1..).take_while(|&number| making.path(number).exists()).count();
+        making.has(count);
+        making
+    }
+
+    fn state(&self) -> MutexGuard<'_, MakingState> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The file of a sheet, from 1.
+    fn path(&self, number: usize) -> PathBuf {
+        self.folder.join(format!("{number:05}.rgl"))
+    }
+
+    /// So many sheets are there.
+    fn has(&self, count: usize) {
+        self.state().count = count;
+        self.more.notify_all();
+    }
+
+    /// Whether so many sheets are there.
+    fn holds(&self, count: u32) -> bool {
+        self.state().count >= usize::try_from(count).unwrap_or(usize::MAX)
+    }
+
+    /// Nobody wants more.
+    fn enough(&self) {
+        self.state().is_enough = true;
+    }
+
+    /// No more will come once what is given back is dropped.
+    fn until_over(&self) -> impl Drop + use<'_> {
+        struct Over<'a>(&'a Making);
+        impl Drop for Over<'_> {
+            fn drop(&mut self) {
+                self.0.state().is_over = true;
+                self.0.more.notify_all();
+            }
+        }
+        Over(self)
     }
 }
 
-impl Sheets for Folder {
+impl Sheets for Making {
     fn count(&self) -> usize {
-        self.files.len()
+        self.state().count
     }
 
-    fn sheet(&self, index: usize) -> io::Result<Cow<'_, [u8]>> {
-        Ok(Cow::Owned(fs::read(&self.files[index])?))
+    fn sheet(&self, index: usize) -> io::Result<Option<Cow<'_, [u8]>>> {
+        let mut state = self.state();
+        while state.count <= index && !state.is_over {
+            state = self.more.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+        let is_there = state.count > index;
+        drop(state);
+        is_there.then(|| Ok(Cow::Owned(fs::read(self.path(index + 1))?))).transpose()
     }
 }
-
 /// What is told of a job becomes its state and the printers'.
 struct Voice<'a> {
     server: &'a Server,
     id: u32,
-    /// Steps of the current stage, and those done.
-    stage: Mutex<(u64, u64)>,
 }
 
 impl Voice<'_> {
@@ -262,7 +452,13 @@ impl Voice<'_> {
         self.server.data().jobs.get(&self.id).map_or_else(String::new, |job| job.message.clone())
     }
 
+    /// Whether the delivery has found the disk full.
+    fn lacks_space(&self) -> bool {
+        self.server.data().reasons.contains(&Reason::SpoolAreaFull)
+    }
+
     fn say(&self, text: &str) {
+        let text = &self.server.without_places(text);
         let mut data = self.server.data();
         data.message = text.into();
         data.changed = now();
@@ -274,14 +470,9 @@ impl Voice<'_> {
 }
 
 impl Observer for Voice<'_> {
-    fn begin(&self, _stage: &str, total: u64) {
-        *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = (total, 0);
-    }
+    fn begin(&self, _: &str, _: u64) {}
 
-    fn advance(&self, steps: u64) {
-        let mut stage = self.stage.lock().unwrap_or_else(PoisonError::into_inner);
-        stage.1 += steps;
-    }
+    fn advance(&self, _: u64) {}
 
     fn end(&self) {}
 
@@ -311,13 +502,17 @@ impl Report for Voice<'_> {
 
     fn error(&self, text: &str) {
         self.say(text);
-        self.server.observer.note(&format!("job {}: {text}", self.id));
+        // Of a full disk it is told when the job is tried again.
+        if !self.lacks_space() {
+            self.server.observer.note(&format!("job {}: {text}", self.id));
+        }
     }
 
     fn debug(&self, _: &str) {}
 
     fn page(&self, number: usize) {
-        // If that cannot be saved, the number is counted again after a restart, from the delivery's own records.
+        // If that cannot be saved, the number is counted again after a restart, from the delivery's own
+        // records.
         let _ = self.server.change(self.id, |job| {
             job.done = u32::try_from(number).unwrap_or(u32::MAX);
             Ok(())

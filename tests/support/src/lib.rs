@@ -9,6 +9,7 @@ pub mod browser;
 pub mod damage;
 pub mod device;
 pub mod ipp;
+pub mod namespace;
 pub mod program;
 pub mod pwg;
 

@@ -27,6 +27,7 @@ pub(crate) const PICTURE: Request<'static> = Request {
     page: None,
     planes: None,
     pixels: MOST_PIXELS,
+    finest: None,
     room: "a page at 1200 dpi",
     besides: ", OpenRaster, SVG, PDF or PostScript",
 };

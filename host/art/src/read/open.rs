@@ -23,6 +23,8 @@ use crate::read::inks_by_name::{self, Layers, Source};
 use crate::read::layered;
 use crate::read::names::{self, stem};
 use crate::read::pdf;
+use crate::read::picture;
+use crate::read::size::{self, Unstated};
 use crate::read::svg;
 
 /// File extensions of pictures.
@@ -117,8 +119,40 @@ fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<
     // One layer, or colours that stand for inks, are no four plates.
     let is_one = !is_tiff && (options.reserves() || names::ink(&stem(file)).is_some());
     let planes: Option<&dyn Fn(&str) -> bool> = if is_one { None } else { Some(&inks_by_name::is_wanted) };
+    if let Some((dots, notes)) = finer_than_dots(file, &bytes, options) {
+        let finest = (dots.0 as u32, dots.1 as u32);
+        let asked = Request { finest: Some(finest), planes, ..file::PICTURE };
+        let mut picture = file::picture_of(file, bytes, &asked)?;
+        picture.to_srgb()?;
+        picture.notes.extend(notes);
+        return Ok(picture::artwork_of(picture, dots, options));
+    }
     let asked = Request { page: options.page(), planes, ..file::PICTURE };
     inks_by_name::artwork(file::picture_of(file, bytes, &asked)?, options)
+}
+
+/// Pixels from which a picture is made smaller while it is read: the dots of the largest sheet, so what most
+/// pictures have stays in memory. Source: 203.2 x 320.5 mm (Legal) at 600 dpi.
+const LARGE: u64 = 4800 * 7572;
+
+/// The dots of a large picture that has more pixels than dots, and nothing but colours, and what is said of its
+/// size.
+fn finer_than_dots(file: &Path, bytes: &[u8], options: &Options) -> Option<((usize, usize), Vec<String>)> {
+    let name = stem(file);
+    let is_plain = !options.reserves() && names::ink(&name).is_none() && names::closest(&name).is_none();
+    if !is_plain || readers::is_tiff(bytes) || options.pages != Pages::Only {
+        return None;
+    }
+    let ((width, height), resolution) = readers::stated(bytes, file)?;
+    if u64::from(width) * u64::from(height) <= LARGE {
+        return None;
+    }
+    let sides = (f64::from(width), f64::from(height));
+    // What is wrong about its size is told where it is read as a whole.
+    let unstated = Unstated::FillRoom;
+    let mut notes = Vec::new();
+    let dots = size::dots(file, sides, resolution, unstated, options, &mut notes).ok()?;
+    (dots.0 < width as usize || dots.1 < height as usize).then_some((dots, notes))
 }
 
 /// Refuses a choice of pages where there are none.

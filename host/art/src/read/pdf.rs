@@ -42,7 +42,7 @@ use readers::Raster;
 pub use complaint::{OLDER, cut_short, damaged, impossible_size, no_page};
 pub use draw::Part;
 pub use drawer::{DrawError, Drawer, Drawing};
-pub use ghostscript::{Interpreter, command, interpreter, order};
+pub use ghostscript::{Interpreter, command, interpreter, order, page_count};
 pub use plates::{Separated, Survey, Surveyed, separated, survey};
 pub use suspected::Suspected;
 

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use crate::budget::Client;
-use crate::jobs::{Job, State};
+use crate::jobs::{Job, State, Version, put_aside};
 use crate::template::{AUTO, Loaded, Size, label, paper, size};
 
 /// What a cartridge says of itself.
@@ -31,11 +31,13 @@ pub struct Cartridge {
 /// What outlives the process beside jobs.
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct Kept {
+    pub(super) version: Version,
     /// Makes the identities of printers this computer's own.
     pub(super) seed: String,
     /// What somebody elsewhere has to know to change things.
     pub(super) code: String,
     pub(super) loaded: Loaded,
+    pub(super) revision: u32,
 }
 
 /// What changes.
@@ -62,6 +64,10 @@ pub struct Data {
     /// The cartridges it has found; none before it was asked.
     pub cartridges: Vec<Cartridge>,
     pub(super) kept: Kept,
+    /// What could not be read at the start, in words.
+    pub aside: Vec<String>,
+    /// When a job that could not be kept is tried again.
+    pub(super) again: Option<Instant>,
     /// When any of this changed, in seconds since 1970.
     pub changed: u64,
     /// When the sheet changed.
@@ -80,6 +86,16 @@ impl Data {
     /// The job that is printed now.
     pub fn current(&self) -> Option<&Job> {
         self.jobs.values().find(|job| job.state == State::Processing)
+    }
+
+    /// Counts how often somebody has said what is loaded: who changes it says which count they saw.
+    pub fn revision(&self) -> u32 {
+        self.kept.revision
+    }
+
+    /// Jobs that are held until the printer was switched off and on.
+    pub fn await_switch(&self) -> impl Iterator<Item = &Job> {
+        self.jobs.values().filter(|job| job.state == State::Held && job.awaits_switch)
     }
 
     /// A job that has stopped until somebody does what its message says, and releases it.
@@ -103,7 +119,8 @@ impl Data {
             .filter(|_| self.current().is_none() && pending().all(|job| self.lacks_sheet(job)))
     }
 
-    /// Why the device does not print, or soon will not, as keywords. While another job is printed, one that has stopped is a warning.
+    /// Why the device does not print, or soon will not, as keywords. While another job is printed, one that
+    /// has stopped is a warning.
     pub fn keywords(&self) -> Vec<&'static str> {
         let mut all: Vec<&str> = self.reasons.iter().map(|reason| reason.keyword()).collect();
         let word = if self.current().is_some() { "other-warning" } else { "other-error" };
@@ -172,27 +189,69 @@ pub fn identity(data: &Data, of: &str) -> String {
 /// What the system says.
 pub fn identities(folder: &Path, printers: &[String]) -> std::io::Result<Vec<String>> {
     durable::make_folder(folder, Access::Private)?;
-    let kept = kept(folder)?;
+    let kept = kept(folder, &mut Vec::new())?;
     Ok(printers.iter().map(|name| uuid(&kept.seed, &format!("printer {name}"))).collect())
 }
 
-/// What is kept beside the jobs in a folder; made if it is not there or cannot be read.
-pub(super) fn kept(folder: &Path) -> std::io::Result<Kept> {
-    let path = folder.join("server.json");
-    let kept = std::fs::read(&path).ok().and_then(|text| serde_json::from_slice::<Kept>(&text).ok());
-    if let Some(kept) = kept.filter(|kept| paper(kept.loaded.size).is_some()) {
-        return Ok(kept);
+/// What is kept beside the jobs in a folder. What cannot be read is put aside, and its former version is
+/// taken; without one it is made. What became of it goes to `aside`, in words.
+pub(super) fn kept(folder: &Path, aside: &mut Vec<String>) -> std::io::Result<Kept> {
+    let path = folder.join(KEPT);
+    let read = |path: &Path| match std::fs::read(path) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        text => {
+            let kept = text
+                .map_err(|error| error.to_string())
+                .and_then(|text| serde_json::from_slice::<Kept>(&text).map_err(|error| error.to_string()))?;
+            let is_sheet = paper(kept.loaded.size).is_some();
+            if is_sheet { Ok(Some(kept)) } else { Err("its sheet is none".to_owned()) }
+        }
+    };
+    match read(&path) {
+        Ok(Some(kept)) => return Ok(kept),
+        Ok(None) => {}
+        Err(why) => {
+            let to = put_aside(&path, folder)?;
+            let then = match read(&path.with_extension(FORMER)) {
+                Ok(Some(former)) => {
+                    keep(folder, &former)?;
+                    aside.push(format!(
+                        "what is known of the printer could not be read ({why}) and lies in {}; what was known before is taken: look \
+                         whether the right sheet is set",
+                        to.display()
+                    ));
+                    return Ok(former);
+                }
+                _ => "the code is another one, and the printers are new ones for other computers",
+            };
+            aside.push(format!(
+                "what is known of the printer could not be read ({why}) and lies in {}; {then}",
+                to.display()
+            ));
+        }
     }
     let mut seed = [0; 16];
     crate::random(&mut seed)?;
-    let loaded = Loaded { size: size(Paper::A4), kind: crate::template::AUTO.into() };
-    let kept = Kept { seed: hex(&seed), code: code()?, loaded };
-    keep(&path, &kept)?;
+    let loaded = Loaded { size: size(Paper::A4), kind: AUTO.into() };
+    let kept = Kept { version: Version, seed: hex(&seed), code: code()?, loaded, revision: 0 };
+    keep(folder, &kept)?;
     Ok(kept)
 }
 
-pub(super) fn keep(path: &Path, kept: &Kept) -> std::io::Result<()> {
-    durable::write(path, &serde_json::to_vec(kept)?, Access::Private)
+/// Its file.
+const KEPT: &str = "server.json";
+/// The end of the name of its former version.
+const FORMER: &str = "former.json";
+
+/// Keeps it, and what it was before beside it.
+pub(super) fn keep(folder: &Path, kept: &Kept) -> std::io::Result<()> {
+    let path = folder.join(KEPT);
+    match std::fs::read(&path) {
+        Ok(former) => durable::write(&path.with_extension(FORMER), &former, Access::Private)?,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+        Err(error) => return Err(error),
+    }
+    durable::write(&path, &serde_json::to_vec(kept)?, Access::Private)
 }
 
 /// A code for people: no letters that look alike, and 2^40 of them are not tried out over a network.

@@ -121,7 +121,8 @@ fn what_is_announced_is_what_the_printer_says_of_itself() {
     let port = running.address.port();
     // Through the loopback, so that nothing of a test is heard outside.
     let advert =
-        Advert::begin(&[(printer, uuid)], &computer, port, |name| name == "lo" || name == "lo0").unwrap();
+        Advert::begin(&[(printer, uuid)], (&computer, &computer), port, |name| name == "lo" || name == "lo0")
+            .unwrap();
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     socket.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
     let called = title("standard", &computer);

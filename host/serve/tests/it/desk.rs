@@ -58,7 +58,7 @@ fn the_loaded_sheet_is_what_dialogs_are_told() {
         (409, 409, 409)
     );
     let about = ask(&running, "GET /desk.json", b"").1;
-    assert!(about.contains(r#""kind":"film","size":"jpn_hagaki_100x148mm""#), "{about}");
+    assert!(about.contains(r#""kind":"film","revision":1,"size":"jpn_hagaki_100x148mm""#), "{about}");
     let uri = format!("ipp://{}/ipp/print", running.address);
     let (_, answer) = testing::ipp::ask(running.address, &testing::ipp::request(11, &uri, &[], &[])).unwrap();
     let text = String::from_utf8_lossy(&answer);

@@ -6,7 +6,7 @@ use observe::Silent;
 use press::inspect::inspect;
 use serve::body::Limits;
 use serve::jobs::State;
-use serve::template::{AUTO, Loaded, size};
+use serve::template::size;
 use testing::ipp::Attribute;
 use testing::needs::ghostscript;
 
@@ -118,8 +118,7 @@ fn photographs_lie_on_the_loaded_sheet_whole() {
     let (found, said) = printed(&running, &[], &photo(900, 600, None));
     assert_eq!(found, [276.0, 0.0, 4248.0, 6372.0]);
     assert!(said.ends_with("for it states no resolution"), "{said}");
-    let card = Loaded { size: size(protocol::paper::Paper::Postcard), kind: AUTO.into() };
-    running.server.load(card).unwrap();
+    running.server.load((Some(size(protocol::paper::Paper::Postcard)), None), None).unwrap();
     let (found, _) = printed(&running, &[], &photo(1654, 2339, Some(200)));
     assert_eq!((found[1], found[3]), (0.0, 3082.0));
     assert!(found[2] < 2202.0, "{found:?}");
@@ -139,7 +138,7 @@ fn a_job_for_another_sheet_waits_and_others_pass_it() {
     let passes = running.print(&[], &super::limits::sheet(), State::Pending);
     assert!(!data().lacks_sheet(&passes));
     assert_eq!(server.next().id, passes.id);
-    server.load(Loaded { size: size(protocol::paper::Paper::Postcard), kind: AUTO.into() }).unwrap();
+    server.load((Some(size(protocol::paper::Paper::Postcard)), None), None).unwrap();
     assert_eq!(server.next().id, waits.id);
 }
 

@@ -10,7 +10,7 @@ use press::inspect::inspect;
 use protocol::paper::Paper;
 use serve::body::Limits;
 use serve::jobs::{Job, State};
-use serve::template::{AUTO, Loaded, size};
+use serve::template::{AUTO, size};
 use testing::ipp::{self, Attribute};
 
 use super::Running;
@@ -67,7 +67,7 @@ impl Running {
 fn a_job_that_names_no_sheet_is_printed_on_the_loaded_one() {
     let running = Running::start(Limits::default(), true);
     let load = |paper: Paper, kind: &str| {
-        running.server.load(Loaded { size: size(paper), kind: kind.into() }).unwrap();
+        running.server.load((Some(size(paper)), Some(kind.into())), None).unwrap();
     };
     let mut picture = std::io::Cursor::new(Vec::new());
     image::RgbImage::from_pixel(40, 40, image::Rgb([0; 3]))

@@ -9,9 +9,10 @@ mod fitted;
 mod jobs;
 mod limits;
 mod rights;
+mod stuck;
 
 use std::net::{SocketAddr, TcpListener};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use inks::Library;
@@ -28,7 +29,9 @@ pub struct Running {
     pub server: Arc<Server>,
     /// Where it listens.
     pub address: SocketAddr,
-    folder: TempDir,
+    place: PathBuf,
+    /// It goes with the server.
+    _folder: Option<TempDir>,
 }
 
 impl Running {
@@ -36,25 +39,20 @@ impl Running {
     pub fn start(limits: Limits, prints: bool) -> Running {
         let folder = tempfile::tempdir().unwrap();
         let to = format!("file:{}", folder.path().join("sheets").display());
-        Running::begin(folder, &to, limits, prints)
+        let running = Running::begin_in(folder.path().to_path_buf(), &to, limits, prints);
+        Running { _folder: Some(folder), ..running }
     }
 
     /// One that sends sheets there, and prints nothing.
     pub fn start_to(to: &str, limits: Limits) -> Running {
-        Running::begin(tempfile::tempdir().unwrap(), to, limits, false)
+        let folder = tempfile::tempdir().unwrap();
+        let running = Running::begin_in(folder.path().to_path_buf(), to, limits, false);
+        Running { _folder: Some(folder), ..running }
     }
 
-    fn begin(folder: TempDir, to: &str, limits: Limits, prints: bool) -> Running {
-        let choices = Choices::default();
-        let settings = Settings {
-            to: to.parse().unwrap(),
-            printers: vec![Preset { name: "standard".into(), about: "ALPS MD-5500".into(), choices }],
-            folder: folder.path().join("serve"),
-            library: Library::builtin(),
-            devices: device::printers::Printers::at(&folder.path().join("printers")).unwrap(),
-            hosts: vec!["workshop.local".into()],
-        };
-        let server = Arc::new(Server::begin(settings, Box::new(Silent)).unwrap());
+    /// One that keeps its things in a folder.
+    pub fn begin_in(place: PathBuf, to: &str, limits: Limits, prints: bool) -> Running {
+        let server = Arc::new(Server::begin(settings(&place, to), Box::new(Silent)).unwrap());
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap();
         let serving = server.clone();
@@ -63,11 +61,25 @@ impl Running {
             let printing = server.clone();
             std::thread::spawn(move || serve::worker::work(&printing));
         }
-        Running { server, address, folder }
+        Running { server, address, place, _folder: None }
     }
 
     /// A place in the folder of this server.
     pub fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
+        self.place.join(name)
+    }
+}
+
+/// A server with one printer and its things in a folder.
+pub fn settings(place: &Path, to: &str) -> Settings {
+    let choices = Choices::default();
+    Settings {
+        to: to.parse().unwrap(),
+        printers: vec![Preset { name: "standard".into(), about: "ALPS MD-5500".into(), choices }],
+        folder: place.join("serve"),
+        library: Library::builtin(),
+        devices: device::printers::Printers::at(&place.join("printers")).unwrap(),
+        hosts: vec!["workshop.local".into()],
+        instance: None,
     }
 }

@@ -207,7 +207,7 @@ impl<W: std::io::Write> Visit<W> {
     /// The print server of this user, and the one of the system.
     fn server(&mut self) -> Result<()> {
         const PATIENCE: Duration = Duration::from_secs(2);
-        for folder in [serve::folder()?, Path::new("/var/lib/foilpress-serve").to_path_buf()] {
+        for folder in serve::folders()? {
             let running = match Running::find(&folder) {
                 Ok(None) => continue,
                 Ok(Some(running)) => running,

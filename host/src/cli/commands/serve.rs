@@ -1,7 +1,7 @@
 //! `foilpress serve`: a printer for every device of the house.
 //!
-//! The server itself is behind the feature `serve`, for its libraries are many, and whoever builds this program to print one file needs
-//! none of them. The command line is the same without it.
+//! The server itself is behind the feature `serve`, for its libraries are many, and whoever builds this
+//! program to print one file needs none of them. The command line is the same without it.
 
 use std::fs::File;
 use std::net::SocketAddr;
@@ -20,29 +20,39 @@ use device::transit::journal::Journal;
     foilpress serve --to usb:                              (for this computer: http://localhost:8631/)\n  \
     foilpress serve --to usb: --share                      (for every device of the house)\n  \
     foilpress serve --to file:sheets                       (keeps each sheet as a file in the folder sheets)\n  \
-    sudo foilpress serve --to usb: --install               (from now on, at every start of this computer)\n\n\
+    sudo foilpress serve --to usb: --install               (from now on, at every start of this computer)\n  \
+    sudo foilpress serve --to usb:E66 --as left --listen [::]:8632 --install     (a second printer there)\n\n\
     Each preset that fits `foilpress layers` is a printer of its own, at ipp://HOST:8631/ipp/print/PRESET. The printer `standard` \
     is always there. Stop the server with Ctrl-C: jobs are kept, and continue when it starts again.")]
 pub struct Args {
     /// Destination: usb:, serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE, or file:FOLDER
     #[arg(long, value_name = "WHERE", value_parser = destination, required_unless_present = "uninstall")]
     pub to: Option<(String, Destination)>,
-    /// Address and port to listen on
-    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8631")]
-    pub listen: SocketAddr,
-    /// Listen on all addresses of this computer, so that other devices can print
+    /// Address and port to listen on [default: 127.0.0.1:8631]
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    pub listen: Option<SocketAddr>,
+    /// Listen on all addresses of this computer, so that other devices can print; with --listen, on that one
     ///
-    /// Everyone who reaches this computer can print then, and print dialogs find the printers. To change the loaded sheet, or to
-    /// cancel a job of somebody else, other devices need the code that is shown in the terminal.
+    /// Everyone who reaches this computer can print then, and print dialogs find the printers. To change the
+    /// loaded sheet, or to cancel a job of somebody else, other devices need the code that is shown in the
+    /// terminal.
     #[arg(long)]
     pub share: bool,
-    /// Install the server as a service of the system that is found by print dialogs, with your presets (as root)
+    /// Another name under which this computer is asked for, such as printer.lan; may be given several times
+    #[arg(long = "name", value_name = "HOST", value_parser = host_name)]
+    pub names: Vec<String>,
+    /// What this printer is called where a computer has several, each with a server and a port of its own
+    #[arg(long = "as", value_name = "NAME", value_parser = instance)]
+    pub instance: Option<String>,
+    /// Install the server as a service of the system that is found by print dialogs, with your presets (as
+    /// root)
     ///
-    /// Writes a systemd unit, and a service file of Avahi for each printer. Install again after a change of presets.
+    /// Writes a systemd unit and a service file of Avahi for each printer, and copies your presets, profiles
+    /// and ink libraries. Install again after a change of them.
     #[arg(long, conflicts_with_all = ["jobs", "library", "share"])]
     pub install: bool,
     /// Remove the service with everything it has kept (as root)
-    #[arg(long, conflicts_with_all = ["install", "to", "listen", "share", "jobs", "library"])]
+    #[arg(long, conflicts_with_all = ["install", "to", "listen", "share", "jobs", "library", "names"])]
     pub uninstall: bool,
     /// Folder of the jobs [default: serve/ beside the jobs of `send`]
     #[arg(long, value_name = "DIR")]
@@ -96,9 +106,46 @@ impl Running {
 /// The file of [`Running`].
 const RUNNING: &str = "running.json";
 
-/// The folder of the jobs of a user's server.
-pub fn folder() -> Result<PathBuf> {
-    Ok(Journal::of_user()?.folder().join("serve"))
+/// The folder of the jobs of a user's server, or of one of several.
+pub fn folder(instance: Option<&str>) -> Result<PathBuf> {
+    let name = instance.map_or_else(|| "serve".to_owned(), |name| format!("serve@{name}"));
+    Ok(Journal::of_user()?.folder().join(name))
+}
+
+/// The folders of all servers of this user and of the system.
+///
+/// # Errors
+/// There is no place for the user's.
+pub fn folders() -> Result<Vec<PathBuf>> {
+    let own = folder(None)?;
+    let mut all = Vec::new();
+    for first in [own.as_path(), Path::new("/var/lib/foilpress-serve")] {
+        all.push(first.to_path_buf());
+        let beside = first.parent().and_then(|parent| std::fs::read_dir(parent).ok()).into_iter().flatten();
+        let start = format!("{}@", first.file_name().unwrap_or_default().to_string_lossy());
+        let is_one =
+            |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(&start));
+        let mut others: Vec<PathBuf> =
+            beside.filter_map(|entry| Some(entry.ok()?.path())).filter(is_one).collect();
+        others.sort();
+        all.append(&mut others);
+    }
+    Ok(all)
+}
+
+/// A name that a host may have.
+fn host_name(text: &str) -> Result<String, String> {
+    let label =
+        |label: &str| !label.is_empty() && label.chars().all(|c| c.is_ascii_alphanumeric() || c == '-');
+    match text.len() <= 253 && text.trim_end_matches('.').split('.').all(label) {
+        true => Ok(text.trim_end_matches('.').to_owned()),
+        false => Err("a host's name has letters, digits and - between dots, such as printer.lan".into()),
+    }
+}
+
+/// The name of a server among several.
+fn instance(text: &str) -> Result<String, String> {
+    crate::folders::folder(Path::new(""), text).map(|_| text.to_owned()).map_err(|error| error.to_string())
 }
 
 fn destination(text: &str) -> Result<(String, Destination), device::connection::NoDestination> {
@@ -118,7 +165,7 @@ pub use with_server::run;
 
 #[cfg(feature = "serve")]
 mod with_server {
-    use std::net::{Ipv6Addr, TcpListener};
+    use std::net::{Ipv4Addr, Ipv6Addr, TcpListener};
     use std::sync::Arc;
 
     use anyhow::{Context as _, bail};
@@ -126,7 +173,7 @@ mod with_server {
     use serve::advert::{Advert, has_avahi, is_real};
     use serve::body::Limits;
     use serve::http;
-    use serve::install::{Places, Service, UNIT};
+    use serve::install::{Places, Service};
     use serve::server::{Preset, Server, Settings, identities};
     use serve::worker;
 
@@ -156,32 +203,29 @@ mod with_server {
     /// Runs `serve` until the process is ended.
     pub fn run(args: &Args, program: &clap::Command) -> Result<()> {
         let (typed, to) = match &args.to {
-            _ if args.uninstall => return uninstall(),
+            _ if args.uninstall => return uninstall(args),
             Some(to) => to.clone(),
             None => bail!("--to says where sheets go, such as --to usb:"),
         };
         if args.install {
-            return install(&typed, args.listen.port(), program);
+            return install(args, &typed, program);
         }
         let folder = match &args.jobs {
             Some(folder) => folder.clone(),
-            None => super::folder()?,
+            None => super::folder(args.instance.as_deref())?,
         };
-        let listen = match args.share {
-            true => SocketAddr::from((Ipv6Addr::UNSPECIFIED, args.listen.port())),
-            false => args.listen,
-        };
-        let listener = TcpListener::bind(listen).with_context(|| {
-            format!("cannot listen on {listen}; is another server there? --listen chooses another port")
-        })?;
-        let address = listener.local_addr()?;
+        let listeners = listen(args)?;
+        let address = listeners[0].local_addr()?;
+        let mut hosts = hosts();
+        hosts.extend(args.names.iter().cloned());
         let settings = Settings {
             to,
             printers: printers(program)?,
             folder,
             library: crate::libraries::given(args.library.as_deref())?,
             devices: Printers::of_system()?,
-            hosts: hosts(),
+            hosts,
+            instance: args.instance.clone(),
         };
         let host = match address.ip().is_unspecified() {
             true => settings.hosts.first().map_or("localhost", String::as_str).to_owned(),
@@ -225,7 +269,38 @@ mod with_server {
         let printing = server.clone();
         std::thread::Builder::new().name("printing".into()).spawn(move || worker::work(&printing))?;
         show(&text)?;
-        Ok(http::run(&server, vec![listener], Limits::default())?)
+        Ok(http::run(&server, listeners, Limits::default())?)
+    }
+
+    /// The port without `--listen`.
+    const PORT: u16 = 8631;
+
+    /// Listens where the arguments say: on the address that is given; to share without one, on all addresses
+    /// of both families, of which one is enough.
+    fn listen(args: &Args) -> Result<Vec<TcpListener>> {
+        let bound = |address: SocketAddr| {
+            TcpListener::bind(address).with_context(|| {
+                format!("cannot listen on {address}; is another server there? --listen chooses another port")
+            })
+        };
+        match args.listen {
+            Some(address) if args.share && address.ip().is_loopback() => bail!(
+                "--share is for other devices, which do not reach {}; leave --listen out, or give it an address of this computer in \
+                 the network, such as --listen [::]:{}",
+                address.ip(),
+                address.port()
+            ),
+            Some(address) => Ok(vec![bound(address)?]),
+            None if !args.share => Ok(vec![bound((Ipv4Addr::LOCALHOST, PORT).into())?]),
+            None => {
+                // Where one socket has both families, the second is in use already.
+                let both: [SocketAddr; 2] =
+                    [(Ipv6Addr::UNSPECIFIED, PORT).into(), (Ipv4Addr::UNSPECIFIED, PORT).into()];
+                let open: Vec<TcpListener> =
+                    both.into_iter().filter_map(|address| TcpListener::bind(address).ok()).collect();
+                if open.is_empty() { Ok(vec![bound(both[1])?]) } else { Ok(open) }
+            }
+        }
     }
 
     /// Announces the printers to other computers, if those can reach them; and what came of it.
@@ -242,7 +317,8 @@ mod with_server {
         let uuid = |printer: &Preset| server.uuid(&format!("printer {}", printer.name));
         let printers: Vec<(Preset, String)> =
             server.settings.printers.iter().map(|printer| (printer.clone(), uuid(printer))).collect();
-        match Advert::begin(&printers, server.settings.computer(), address.port(), is_real) {
+        let called = (server.settings.computer(), server.settings.called());
+        match Advert::begin(&printers, (called.0, &called.1), address.port(), is_real) {
             Ok(advert) => (Some(advert), "yes, while the server runs".into()),
             Err(error) => (None, format!("no: {}", with_causes(&error))),
         }
@@ -259,26 +335,67 @@ mod with_server {
 
     const AS_ROOT: &str = "only root may change services; run the same command with sudo";
 
-    fn install(to: &str, port: u16, program: &clap::Command) -> Result<()> {
-        let places = Places::at(std::path::Path::new("/"));
+    fn install(args: &Args, to: &str, program: &clap::Command) -> Result<()> {
+        let places = Places::at(Path::new("/"), args.instance.as_deref());
         let printers = printers(program)?;
+        let (config, port) = (crate::folders::config()?, args.listen.map_or(PORT, |address| address.port()));
+        for printer in &printers {
+            travels(&printer.name)?;
+        }
+        if let Some(other) = places.with_port(port).context(AS_ROOT)? {
+            bail!(
+                "port {port} is that of the service {other}; choose another one, such as --listen [::]:{}",
+                port + 1
+            );
+        }
         let names: Vec<String> = printers.iter().map(|printer| printer.name.clone()).collect();
         let uuids = identities(&places.state(), &names).context(AS_ROOT)?;
         let printers: Vec<(Preset, String)> = printers.into_iter().zip(uuids).collect();
         let own = std::env::current_exe().context("cannot find this program's own file")?;
-        let presets = crate::folders::config()?.join("presets");
-        let service = Service { program: &own, to, port, printers: &printers, presets: &presets };
+        let service = Service {
+            program: &own,
+            to,
+            listen: args.listen,
+            port,
+            names: &args.names,
+            printers: &printers,
+            config: &config,
+        };
         let written = places.install(&service).context(AS_ROOT)?;
         let list: String = written.iter().map(|path| format!("{}\n", path.display())).collect();
         show(&list)?;
+        let unit = places.unit_name();
         systemctl(&["daemon-reload"])?;
-        systemctl(&["enable", "--now", UNIT])
+        systemctl(&["enable", &unit])?;
+        // One that runs already has read what was there before.
+        systemctl(&["restart", &unit])
     }
 
-    fn uninstall() -> Result<()> {
+    /// Whether a preset has what it needs where the service reads: what it names by the place of a file stays
+    /// behind.
+    fn travels(name: &str) -> Result<()> {
+        let Some((_, words)) = preset::all()?.into_iter().find(|(known, _)| known == name) else {
+            return Ok(());
+        };
+        for word in words {
+            if let Some((option, value)) = word.split_once('=')
+                && Path::new(value).exists()
+                && !crate::libraries::is_built_in(Path::new(value))
+            {
+                bail!(
+                    "the preset `{name}` names {value} ({option}), which the service cannot read; an ink library that was added with \
+                     `foilpress inks add` travels along under its name"
+                );
+            }
+        }
+        Ok(())
+    }
+
+    fn uninstall(args: &Args) -> Result<()> {
+        let places = Places::at(Path::new("/"), args.instance.as_deref());
         // A service that is not there need not be stopped.
-        let stopped = systemctl(&["disable", "--now", UNIT]);
-        Places::at(std::path::Path::new("/")).uninstall().context(AS_ROOT)?;
+        let stopped = systemctl(&["disable", "--now", &places.unit_name()]);
+        places.uninstall().context(AS_ROOT)?;
         show("the service is removed, with its jobs\n")?;
         match stopped {
             Ok(()) => systemctl(&["daemon-reload"]),

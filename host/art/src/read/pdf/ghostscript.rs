@@ -114,6 +114,25 @@ pub fn interpreter(path: &Path) -> Interpreter {
     }
 }
 
+/// How many pages a PDF says to have; `None` if it cannot be read so far.
+pub fn page_count(path: &Path) -> Option<usize> {
+    let path = std::path::absolute(path).ok()?;
+    let named = |option: &str| {
+        let mut named = std::ffi::OsString::from(option);
+        named.push(&path);
+        named
+    };
+    let mut command = Command::new(program());
+    command.args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-dNODISPLAY"]);
+    command.args([named("--permit-file-read="), named("-sDocument=")]);
+    command.args(["-c", "Document (r) file runpdfbegin pdfpagecount == quit"]);
+    let mut process = Process::start(command.stdout(Stdio::piped()), process::limit()).ok()?;
+    let mut said = String::new();
+    process.output()?.take(1 << 10).read_to_string(&mut said).ok()?;
+    process.end(|| false).ok()?;
+    said.trim().parse().ok()
+}
+
 /// The order of the bytes of pixels with tags, of which these are some. If all of them are dark, Ghostscript draws a bare one.
 ///
 /// # Errors
