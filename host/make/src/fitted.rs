@@ -36,6 +36,8 @@ pub struct Fitted {
     pub read: Options,
     /// Whether it has a size of its own.
     is_stated: bool,
+    /// Whether somebody has said how wide it is to be.
+    is_wished: bool,
 }
 
 impl Fitted {
@@ -46,7 +48,7 @@ impl Fitted {
     pub fn of(files: &[PathBuf], read: &Options, paper: Paper, wish: &Wish) -> Result<Fitted, FittedError> {
         let found = seen(files, read)?;
         let (edge, mut wish) = (if found.is_page { Edge::Margin } else { Edge::Content }, *wish);
-        if !found.is_stated && wish.scaling != Scaling::Fill {
+        if !found.is_stated && !matches!(wish.scaling, Scaling::Fill | Scaling::Wide(_)) {
             wish.scaling = Scaling::Fit;
         }
         let fit = fit(found.size_mm, edge, paper, &wish)?;
@@ -60,7 +62,8 @@ impl Fitted {
             room: Room { cut: true, ..Room::default() },
             ..read.clone()
         };
-        Ok(Fitted { fit, read, is_stated: found.is_stated })
+        let is_wished = matches!(wish.scaling, Scaling::Wide(_));
+        Ok(Fitted { fit, read, is_stated: found.is_stated, is_wished })
     }
 
     /// These settings for art that lies so.
@@ -80,6 +83,9 @@ impl fmt::Display for Fitted {
             return self.fit.fmt(f);
         }
         let turned = Fit { scale: 1.0, ..self.fit }.to_string();
+        if self.is_wished {
+            return f.write_str(&turned);
+        }
         let and = if turned.is_empty() { "" } else { " and " };
         write!(f, "{turned}{and}as large as the sheet allows, for it states no resolution")
     }

@@ -233,7 +233,7 @@ pub fn plan_page(plan: &Plan, drawn: Drawn<'_>, ground: Ground) -> Result<String
     let across = across(plan);
     let passes = drawn.passes.par_iter();
     let pictures = Pictures {
-        sheet: thumbnail(drawn.sheet, across, ground, THUMBNAIL),
+        sheet: thumbnail(drawn.sheet, drawn.sheet.whole(), across, ground, THUMBNAIL),
         passes: passes.map(|pass| pass_thumbnail(pass, drawn.area, across, ground, PASS_THUMBNAIL)).collect(),
     };
     Ok(page::html(plan, &pictures)?)

@@ -1,16 +1,18 @@
 //! The filter: pages in, jobs in the printer's language out, one for each sheet.
 //!
-//! Problem: the print system hands over PDF or pictures of pages, of any size, with margins this printer cannot print on.
-//! Method: a PDF is drawn by Ghostscript, which also tells what drew each pixel; each page becomes art as if it
-//! were a picture given to `foilpress layers`: text keeps its outline, reserved colours are inks of their own if
-//! wanted, everything else is halftoned in process inks. A page with spot colours that name inks is separated,
-//! too, and the plates of these are layers. The whole page is halftoned, as `foilpress layers` does it, so both make
-//! the same dots. It is fitted to the sheet that is given, and drawn as large as it is printed
-//! ([`press::layout::fit`]); a print queue's page has a sheet of its own size. What lies on the margins is told in
-//! millimetres.
+//! Problem: the print system hands over PDF or pictures of pages, of any size, with margins this printer
+//! cannot print on.
+//! Method: a PDF is drawn by Ghostscript, which also tells what drew each pixel; each page becomes art as if
+//! it were a picture given to `foilpress layers`: text keeps its outline, reserved colours are inks of their
+//! own if wanted, everything else is halftoned in process inks. A page with spot colours that name inks is
+//! separated, too, and the plates of these are layers. The whole page is halftoned, as `foilpress layers`
+//! does it, so both make the same dots. It is fitted to the sheet that is given, and drawn as large as it is
+//! printed ([`press::layout::fit`]); a print queue's page has a sheet of its own size. What lies on the
+//! margins is told in millimetres.
 //! Cost: the page at a bit or four bytes a pixel, and what [`art`] costs; for documents that may have spot
-//! colours, one more drawing of all pages at a low resolution; for those that may have gradients that Ghostscript
-//! leaves out, a run without output; where pages get another scale than the one before, one more start.
+//! colours, one more drawing of all pages at a low resolution; for those that may have gradients that
+//! Ghostscript leaves out, a run without output; where pages get another scale than the one before, one more
+//! start.
 //! Limits: documents of 1 GB and 1000 pages. Transparency is gone when a page has been drawn, so white cannot
 //! follow it.
 
@@ -168,8 +170,22 @@ fn io_error(what: &'static str) -> impl FnOnce(io::Error) -> FilterError {
     move |source| FilterError::Io { what, source }
 }
 
+/// Where a page lies on its sheet, in millimetres: its corner from that of the sheet, and its sides as they
+/// are printed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lies {
+    /// From the left.
+    pub left: f64,
+    /// From the top.
+    pub top: f64,
+    /// Width.
+    pub width: f64,
+    /// Length.
+    pub length: f64,
+}
+
 /// What became of a document.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Filtered {
     /// Jobs that were written, one for each sheet.
     pub jobs: usize,
@@ -177,6 +193,8 @@ pub struct Filtered {
     pub laid: Vec<String>,
     /// Whether anything that is drawn was cut.
     pub is_cut: bool,
+    /// Where the first page lies that is printed, if it was laid on a sheet.
+    pub lies: Option<Lies>,
 }
 
 /// Makes jobs of a document. A page on which nothing is drawn becomes no job, with a note.

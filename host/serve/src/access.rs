@@ -72,17 +72,32 @@ pub fn check(asked: &Asked<'_>, names: &[String], is_ipp: bool) -> Result<(), &'
     }
 }
 
-/// What a browser asks of the desk.
+/// A file of the page.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Route {
-    /// The page.
+pub enum Asset {
+    /// The page itself.
     Page,
-    /// Its script.
-    Script,
     /// Its style.
     Style,
     /// Its icon.
     Icon,
+    /// The script that the others belong to.
+    Desk,
+    /// Requests.
+    Ask,
+    /// The sheet.
+    Sheet,
+    /// What a job asks for.
+    Ticket,
+    /// What is going on.
+    Lists,
+}
+
+/// What a browser asks of the desk.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Route {
+    /// A file of the page.
+    File(Asset),
     /// How things are.
     State,
     /// A document becomes a job that is held.
@@ -93,6 +108,12 @@ pub enum Route {
     Plan,
     /// A picture of that.
     Preview,
+    /// A small picture of what it prints or has printed.
+    Picture,
+    /// It is to be printed in another way.
+    Change,
+    /// What was printed is printed again.
+    Again,
     /// A job that was held is printed.
     Release,
     /// A job waits until it is released.
@@ -143,15 +164,7 @@ pub enum Who {
 #[must_use]
 pub fn who(deed: Deed) -> Who {
     match deed {
-        Deed::Desk(
-            Route::Page
-            | Route::Script
-            | Route::Style
-            | Route::Icon
-            | Route::State
-            | Route::Upload
-            | Route::Chart,
-        )
+        Deed::Desk(Route::File(_) | Route::State | Route::Upload | Route::Chart)
         | Deed::Ipp(
             Operation::PrintJob
             | Operation::ValidateJob
@@ -163,7 +176,15 @@ pub fn who(deed: Deed) -> Who {
             | Operation::IdentifyPrinter,
         ) => Who::Anybody,
         Deed::Desk(
-            Route::Plan | Route::Preview | Route::Release | Route::Hold | Route::Cancel | Route::Lay,
+            Route::Plan
+            | Route::Preview
+            | Route::Picture
+            | Route::Change
+            | Route::Again
+            | Route::Release
+            | Route::Hold
+            | Route::Cancel
+            | Route::Lay,
         )
         | Deed::Ipp(
             Operation::SendDocument
@@ -342,15 +363,15 @@ mod tests {
     }
 
     const ROUTES: [Route; 15] = [
-        Route::Page,
-        Route::Script,
-        Route::Style,
-        Route::Icon,
+        Route::File(Asset::Page),
         Route::State,
         Route::Upload,
         Route::Chart,
         Route::Plan,
         Route::Preview,
+        Route::Picture,
+        Route::Change,
+        Route::Again,
         Route::Release,
         Route::Hold,
         Route::Cancel,
@@ -364,7 +385,8 @@ mod tests {
         let name = format!("{deed:?}");
         let name = name.trim_start_matches("Desk(").trim_start_matches("Ipp(").trim_end_matches(')');
         match name {
-            "Plan" | "Preview" | "Release" | "Hold" | "Cancel" | "Lay" => 'o',
+            "Plan" | "Preview" | "Picture" | "Change" | "Again" => 'o',
+            "Release" | "Hold" | "Cancel" | "Lay" => 'o',
             "SendDocument" | "CancelJob" | "HoldJob" | "ReleaseJob" | "CloseJob" => 'o',
             "Load" | "Switched" | "CancelJobs" => 'k',
             _ => 'a',

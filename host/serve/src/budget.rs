@@ -146,6 +146,12 @@ impl Disk {
         Disk(bytes.map(|bytes| bytes / DISK))
     }
 
+    /// What documents may take that were printed already.
+    #[must_use]
+    pub fn printed(self) -> u64 {
+        self.0.map_or(u64::MAX, |most| most / DISK_OF_ONE)
+    }
+
     /// Whether a client's documents may take so many bytes, and all together so many.
     ///
     /// # Errors

@@ -1,13 +1,15 @@
 //! The desk: a page for people, and what it asks for.
 //!
-//! Method: the page is three files in the program, and asks for one description of everything every two seconds. A document that is
-//! dropped on it becomes a held job; its sheets are drawn, and what the simulated printer makes of the first one is shown with its
-//! passes. Printing releases the job, whose sheets are there already. Charts go the same way ([`charts`]).
-//! Cost: a preview is a picture of a sheet, dot for dot, made once. Limits: no file of another machine, so it works without internet.
+//! Method: the page is a few files in the program, and asks for one description of everything every two seconds. A document that is
+//! dropped on it becomes a held job; its sheets are drawn, and shown as the simulated printer makes them ([`sheet`]). What is changed
+//! there becomes the job's ticket, and it is drawn again. Printing releases the job, whose sheets are there already. Charts go the
+//! same way ([`charts`]). What was printed can be printed again.
+//! Limits: no file of another machine, so it works without internet.
 //! Source: what owners like of LPrint and PAPPL: the loaded sheet is set here, for dialogs can only read it.
 
+pub mod sheet;
+
 use std::fs;
-use std::io::Write as _;
 use std::net::IpAddr;
 use std::path::PathBuf;
 
@@ -18,7 +20,7 @@ use hyper::{Method, Response, StatusCode};
 use observe::{Silent, with_causes};
 use serde_json::{Value, json};
 
-use crate::access::{Asker, Permit, Route};
+use crate::access::{Asker, Asset, Permit, Route};
 use crate::body::{Gone, Limits, keep, plain, words};
 use crate::budget::{Client, Purpose};
 use crate::charts::{self, CHARTS};
@@ -28,26 +30,27 @@ use crate::server::{ChangeError, Data, Server, key};
 use crate::spool::{Kind, Packing, Spool, SpoolError};
 use crate::template::{AUTO, Ticket, keyword_of, label, sheets, size_of};
 use crate::values::clean;
-use crate::worker;
-use device::encodings;
 use device::ledger::{Ledger, totals};
 use make::options::of_attribute;
-use press::preview::inks::{Ground, sheet_in_inks};
-use press::simulate::{Setup, print};
-use protocol::ink::Ink;
-use queue::backend::Sheets as _;
 
 /// The routes there are.
-const ROUTES: [(Method, &str, Route); 15] = [
-    (Method::GET, "/", Route::Page),
-    (Method::GET, "/desk.js", Route::Script),
-    (Method::GET, "/desk.css", Route::Style),
-    (Method::GET, "/icon.png", Route::Icon),
+const ROUTES: [(Method, &str, Route); 22] = [
+    (Method::GET, "/", Route::File(Asset::Page)),
+    (Method::GET, "/desk.css", Route::File(Asset::Style)),
+    (Method::GET, "/icon.png", Route::File(Asset::Icon)),
+    (Method::GET, "/desk/desk.js", Route::File(Asset::Desk)),
+    (Method::GET, "/desk/ask.js", Route::File(Asset::Ask)),
+    (Method::GET, "/desk/sheet.js", Route::File(Asset::Sheet)),
+    (Method::GET, "/desk/ticket.js", Route::File(Asset::Ticket)),
+    (Method::GET, "/desk/lists.js", Route::File(Asset::Lists)),
     (Method::GET, "/desk.json", Route::State),
     (Method::GET, "/desk/preview.png", Route::Preview),
+    (Method::GET, "/desk/picture.png", Route::Picture),
     (Method::POST, "/desk/print", Route::Upload),
     (Method::POST, "/desk/chart", Route::Chart),
     (Method::POST, "/desk/plan", Route::Plan),
+    (Method::POST, "/desk/change", Route::Change),
+    (Method::POST, "/desk/again", Route::Again),
     (Method::POST, "/desk/release", Route::Release),
     (Method::POST, "/desk/hold", Route::Hold),
     (Method::POST, "/desk/cancel", Route::Cancel),
@@ -62,27 +65,44 @@ pub fn route(method: &Method, path: &str) -> Option<Route> {
     ROUTES.into_iter().find(|(by, at, _)| by == method && *at == path).map(|(.., route)| route)
 }
 
-/// The preview in a job's folder.
-const PREVIEW: &str = "preview.png";
+/// A file of the page.
+fn file(asset: Asset) -> Response<Full<Bytes>> {
+    let (kind, text) = match asset {
+        Asset::Page => ("text/html; charset=utf-8", include_str!("desk/desk.html")),
+        Asset::Style => ("text/css; charset=utf-8", include_str!("desk/desk.css")),
+        Asset::Icon => return plain(StatusCode::OK, "image/png", icon()),
+        Asset::Desk => (SCRIPT, include_str!("desk/desk.js")),
+        Asset::Ask => (SCRIPT, include_str!("desk/ask.js")),
+        Asset::Sheet => (SCRIPT, include_str!("desk/sheet.js")),
+        Asset::Ticket => (SCRIPT, include_str!("desk/ticket.js")),
+        Asset::Lists => (SCRIPT, include_str!("desk/lists.js")),
+    };
+    plain(StatusCode::OK, kind, text)
+}
+
+const SCRIPT: &str = "text/javascript; charset=utf-8";
 
 /// Does what is asked, and shows what there is to see.
 pub fn act(server: &Server, permit: &Permit<Route>, query: &str, asker: &Asker) -> Response<Full<Bytes>> {
     let job = permit.job();
-    let file = |kind: &'static str, bytes: &'static [u8]| plain(StatusCode::OK, kind, bytes);
+    let refused = |why: &str| words(StatusCode::UNPROCESSABLE_ENTITY, &server.without_places(why));
     let told = |done: Result<Value, String>| match done {
         Ok(value) => plain(StatusCode::OK, "application/json", value.to_string()),
-        Err(why) => words(StatusCode::UNPROCESSABLE_ENTITY, &server.without_places(&why)),
+        Err(why) => refused(&why),
     };
     let done = match permit.asked() {
-        Route::Page => return file("text/html; charset=utf-8", include_bytes!("desk/desk.html")),
-        Route::Script => return file("text/javascript; charset=utf-8", include_bytes!("desk/desk.js")),
-        Route::Style => return file("text/css; charset=utf-8", include_bytes!("desk/desk.css")),
-        Route::Icon => return plain(StatusCode::OK, "image/png", icon()),
+        Route::File(asset) => return file(asset),
         Route::State => return told(Ok(describe(server, asker))),
         Route::Preview => {
-            return match fs::read(server.store.folder(job).join(PREVIEW)) {
+            return match sheet::view(server, job, query) {
                 Ok(picture) => plain(StatusCode::OK, "image/png", picture),
-                Err(_) => words(StatusCode::NOT_FOUND, "there is no preview of this job"),
+                Err(why) => refused(&why),
+            };
+        }
+        Route::Picture => {
+            return match fs::read(server.store.picture(job)) {
+                Ok(picture) => plain(StatusCode::OK, "image/png", picture),
+                Err(_) => words(StatusCode::NOT_FOUND, "there is no picture of this job"),
             };
         }
         Route::Chart => return told(chart(server, query, asker.from)),
@@ -93,10 +113,12 @@ pub fn act(server: &Server, permit: &Permit<Route>, query: &str, asker: &Asker) 
                     "another plan of yours is being drawn; wait for it",
                 );
             };
-            return told(plan(server, job));
+            return told(sheet::plan(server, job, query));
         }
+        Route::Again => return told(again(server, job, asker.from)),
         // It comes with its body, which `upload` reads.
         Route::Upload => return words(StatusCode::BAD_REQUEST, "the request has no document"),
+        Route::Change => change(server, job, query),
         Route::Load => {
             let size = parameter(query, "size").map(|size| size_of(&size).ok_or(ChangeError::Sheet));
             let kind = parameter(query, "kind");
@@ -112,6 +134,32 @@ pub fn act(server: &Server, permit: &Permit<Route>, query: &str, asker: &Asker) 
         Ok(()) => words(StatusCode::OK, "done"),
         Err(error) => words(StatusCode::CONFLICT, &server.without_places(&with_causes(&error))),
     }
+}
+
+/// Everything that a query says beside the job becomes a change of it.
+fn change(server: &Server, job: u32, query: &str) -> Result<(), ChangeError> {
+    let names = query.split('&').filter_map(|pair| pair.split_once('=').map(|(name, _)| name));
+    let mut changes: Vec<(String, String)> = Vec::new();
+    let mut printer = None;
+    for name in names {
+        let value = parameter(query, name).unwrap_or_default();
+        match name {
+            "job" => {}
+            "printer" => {
+                let missing = || ChangeError::Value("there is no such printer".into());
+                printer = Some(server.printer(&value).ok_or_else(missing)?);
+            }
+            name => changes.push((name.into(), value)),
+        }
+    }
+    server.edit(job, printer, &changes)
+}
+
+/// A job that was printed becomes another one, which is held.
+fn again(server: &Server, job: u32, from: IpAddr) -> Result<Value, String> {
+    let owner = owner(from)?;
+    let id = server.again(job, owner.clone()).map_err(|error| with_causes(&error))?;
+    Ok(made(id, &owner))
 }
 
 /// The owner of what comes from the page at this address, with a new key.
@@ -205,35 +253,6 @@ fn chart(server: &Server, query: &str, from: IpAddr) -> Result<Value, String> {
     held(server, id, kept).map(|()| made(id, &owner))
 }
 
-/// What a held job would print: its passes and the ribbon they take, and a preview of its first sheet.
-fn plan(server: &Server, id: u32) -> Result<Value, String> {
-    let sheets = worker::prepare(server, id)?;
-    let bytes = sheets.sheet(0).map_err(|error| error.to_string())?.ok_or("there is no sheet")?;
-    let checked = encodings::check(&bytes, &Silent).map_err(|error| with_causes(&error))?;
-    let printout = print(&bytes, &Setup::default(), &Silent).map_err(|error| with_causes(&error))?;
-    let printed = printout.sheet().map_err(|error| with_causes(&error))?;
-    let area = sheet::Area { left: 0, top: 0, width: printed.width(), length: printed.length() };
-    let path = server.store.folder(id).join(PREVIEW);
-    let picture = sheet_in_inks(&printed, area, 1, Ground::default()).map_err(|error| with_causes(&error))?;
-    files::write(&path, |out| out.write_all(&picture)).map_err(|error| with_causes(&error))?;
-    let passes: Vec<Value> = checked
-        .passes
-        .iter()
-        .zip(&checked.ribbon_mm)
-        .zip(&printout.passes)
-        .map(|((_, ribbon_mm), pass)| {
-            json!({ "ink": pass.ink.name(), "dots": pass.plane.dots(), "ribbon_mm": ribbon_mm.round() })
-        })
-        .collect();
-    let (note, total) = {
-        let data = server.data();
-        let job = data.jobs.get(&id).ok_or("there is no such job")?;
-        let note = if job.laid.is_empty() { job.message.clone() } else { job.laid.join("; ") };
-        (note, job.sheets)
-    };
-    Ok(json!({ "job": id, "sheets": total, "passes": passes, "note": note }))
-}
-
 /// The value of a parameter in an address, [clean].
 fn parameter(query: &str, name: &str) -> Option<String> {
     let value = query.split('&').find_map(|pair| pair.strip_prefix(name)?.strip_prefix('='))?;
@@ -256,6 +275,9 @@ pub fn number(query: &str, name: &str) -> Option<u32> {
     parameter(query, name)?.parse().ok()
 }
 
+/// The most jobs that are shown.
+const SHOWN: usize = 50;
+
 /// Everything that the page shows.
 fn describe(server: &Server, asker: &Asker) -> Value {
     let data = server.data();
@@ -272,7 +294,8 @@ fn describe(server: &Server, asker: &Asker) -> Value {
         .map(|(keyword, label)| json!({ "keyword": keyword, "label": label }))
         .collect();
     let charts = CHARTS.map(|(name, label, look)| json!({ "name": name, "label": label, "look": look }));
-    let jobs: Vec<Value> = data.jobs.values().rev().take(50).map(|job| about(&data, job, asker)).collect();
+    let jobs: Vec<Value> =
+        data.jobs.values().rev().take(SHOWN).map(|job| about(server, &data, job, asker)).collect();
     let ribbons = Ledger::of(&server.settings.devices).lines().map_or_else(
         |_| Vec::new(),
         |(lines, _)| {
@@ -289,6 +312,8 @@ fn describe(server: &Server, asker: &Asker) -> Value {
         "types": types,
         "loaded": { "size": keyword_of(loaded.size), "kind": loaded.kind, "revision": data.revision() },
         "await_switch": data.await_switch().count(),
+        "is_keeper": asker.is_keeper,
+        "drawing": data.drawing.map(|(job, sheets)| json!({ "job": job, "sheets": sheets })),
         "aside": if asker.is_keeper { data.aside.clone() } else { Vec::new() },
         "state": {
             "message": data.said(),
@@ -299,14 +324,13 @@ fn describe(server: &Server, asker: &Asker) -> Value {
             "wants_cartridge": wanted,
         },
         "cartridges": data.cartridges,
-        "inks": Ink::ALL.map(|ink| json!({ "name": ink.name(), "colour": queue::messages::colour(ink) })),
         "ribbons": ribbons,
         "jobs": jobs,
         "identify": data.identify,
     })
 }
 
-fn about(data: &Data, job: &Job, asker: &Asker) -> Value {
+fn about(server: &Server, data: &Data, job: &Job, asker: &Asker) -> Value {
     let (state, _) = operations::state(data, job);
     let words = match state {
         3 if data.lacks_sheet(job) => "waits for its sheet",
@@ -320,6 +344,7 @@ fn about(data: &Data, job: &Job, asker: &Asker) -> Value {
         8 => "failed",
         _ => "printed",
     };
+    let is_mine = asker.is_keeper || asker.owns(&job.owner);
     json!({
         "id": job.id,
         "name": job.name,
@@ -328,7 +353,10 @@ fn about(data: &Data, job: &Job, asker: &Asker) -> Value {
         "state": words,
         "over": job.state.is_over(),
         "held": job.state == State::Held,
-        "mine": asker.is_keeper || asker.owns(&job.owner),
+        "waits": job.state == State::Pending,
+        "stopped": job.state == State::Held && !job.ticket.held,
+        "mine": is_mine,
+        "again": is_mine && job.state == State::Completed && server.store.document(job).is_some(),
         "lacks": data.lacks_sheet(job).then(|| sheet_of(data, job)),
         "message": job.message,
         "sheets": job.sheets,

@@ -6,7 +6,8 @@
 //! is printed the delivery's own journal knows, so it goes on behind that.
 //! The order at the end of a job is: its end on record, then the journal's records of its sheets removed,
 //! then its document. So there is no step after which a restart would print it again.
-//! Cost: two syncs for each change of a job's state. Limits: the records of the last hundred ended jobs stay.
+//! Cost: two syncs for each change of a job's state. Limits: the records of the last hundred ended jobs stay,
+//! and the documents of the last twenty that were printed, so that they can be printed again.
 //! Source: RFC 8011, section 5.3.7, for the states.
 
 use std::collections::BTreeMap;
@@ -19,7 +20,7 @@ use files::durable::{self, Access};
 use serde::{Deserialize, Serialize};
 
 use crate::budget::Client;
-use crate::template::{AUTO, Ticket};
+use crate::template::Ticket;
 
 /// Ended jobs whose records stay.
 const KEPT: usize = 100;
@@ -139,9 +140,20 @@ pub struct Job {
     pub is_cut: bool,
     /// Whether it is held until the printer was switched off and on, or reset.
     pub awaits_switch: bool,
+    /// How often it was changed after it was drawn, perhaps.
+    pub round: u32,
+    /// Where its first page lies on the sheet, in hundredths of a millimetre: left, top, width, length.
+    pub lies: Option<[i32; 4]>,
 }
 
 impl Job {
+    /// Something of it was changed: what is drawn of it is not right any more.
+    pub fn is_drawn_again(&mut self) {
+        self.round = self.round.wrapping_add(1);
+        (self.sheets, self.lies, self.is_cut) = (None, None, false);
+        self.laid.clear();
+    }
+
     /// The name under which the delivery knows it: no other job's, on any server.
     pub fn identity(&self) -> String {
         format!("serve-{:06}-{:x}", self.id, self.created)
@@ -238,11 +250,20 @@ impl Store {
         self.folder.join(id.to_string())
     }
 
-    /// The folder of a job's drawn sheets. What is drawn for another sheet is elsewhere.
+    /// The folder of a job's drawn sheets, which is another one after each change.
     pub fn sheets(&self, job: &Job) -> PathBuf {
-        let (width, length) = job.ticket.size.unwrap_or_default();
-        let kind = job.ticket.kind.as_deref().unwrap_or(AUTO);
-        self.folder(job.id).join(format!("{SHEETS}{width}x{length}-{kind}"))
+        self.folder(job.id).join(format!("{SHEETS}{}", job.round))
+    }
+
+    /// A small picture of a job's first sheet.
+    pub fn picture(&self, id: u32) -> PathBuf {
+        self.folder(id).join("sheet.png")
+    }
+
+    /// A job's document, if it is still there.
+    pub fn document(&self, job: &Job) -> Option<PathBuf> {
+        let path = self.folder(job.id).join(job.document.as_ref()?);
+        path.is_file().then_some(path)
     }
 
     /// Makes a job's record durable.
@@ -365,6 +386,8 @@ mod tests {
             laid: Vec::new(),
             is_cut: false,
             awaits_switch: false,
+            round: 0,
+            lies: None,
         }
     }
 

@@ -51,7 +51,7 @@ fn failed(server: &Server, request: &Request, error: &ChangeError) -> Response {
         ChangeError::NoJob => StatusCode::ClientErrorNotFound,
         ChangeError::State(_) | ChangeError::Stale => StatusCode::ClientErrorNotPossible,
         ChangeError::Share(_) => StatusCode::ServerErrorBusy,
-        ChangeError::Sheet => StatusCode::ClientErrorAttributesOrValuesNotSupported,
+        ChangeError::Sheet | ChangeError::Value(_) => StatusCode::ClientErrorAttributesOrValuesNotSupported,
         ChangeError::Store(_) | ChangeError::Disk(_) if durable::is_full(error) => {
             StatusCode::ServerErrorTemporaryError
         }

@@ -12,8 +12,8 @@ use crate::budget::Client;
 use crate::server::{Cartridge, Preset, Server, identity};
 use crate::spool::KINDS;
 use crate::template::{
-    AUTO, MOST_COPIES, NO_ORIENTATION, ORIENTATIONS, OVERRIDES, QUALITIES, RESOLUTIONS, Size, keyword_of,
-    margins, paper, sheets, sizes, supported,
+    AUTO, MOST_COPIES, ORIENTATIONS, OVERRIDES, QUALITIES, RESOLUTIONS, Size, keyword_of, margins, paper,
+    sheets, sizes, supported,
 };
 use crate::values::{
     charset, collection, date_time, dpi, integer, keyword, keywords, language, list, long_text, mime, name,
@@ -153,6 +153,7 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
         (D, "document-format-default", mime("application/octet-stream")),
         (D, "document-format-preferred", mime("image/pwg-raster")),
         (D, "document-format-supported", list(formats.into_iter().map(mime))),
+        (D, "document-password-supported", integer(0)),
         (D, "generated-natural-language-supported", language("en")),
         (D, "identify-actions-default", keyword("display")),
         (D, "identify-actions-supported", keyword("display")),
@@ -322,7 +323,8 @@ pub fn attributes(server: &Server, preset: &Preset, place: &Place) -> Vec<Attrib
         (T, "multiple-document-handling-supported", keyword("separate-documents-uncollated-copies")),
         (T, "number-up-default", integer(1)),
         (T, "number-up-supported", integer(1)),
-        (T, "orientation-requested-default", IppValue::Enum(NO_ORIENTATION)),
+        // Without a wish a page lies as it fits.
+        (T, "orientation-requested-default", IppValue::NoValue),
         (
             T,
             "orientation-requested-supported",

@@ -17,6 +17,7 @@ use self::data::{Kept, keep, kept};
 use crate::access::{Asker, Deed, Permit, Refused, permit};
 use crate::budget::{self, Client, Disk, Exceeded, Turns};
 use crate::jobs::{Found, Job, Owner, State, Store, StoreError, Version, after_restart};
+use crate::seen::Seen;
 use crate::template::{Loaded, Size, Ticket, paper, supported};
 use crate::values::now;
 use device::connection::Destination;
@@ -109,6 +110,9 @@ pub enum ChangeError {
     /// No such sheet.
     #[error("the printer does not take such a sheet")]
     Sheet,
+    /// A value that something cannot have.
+    #[error("{0}")]
+    Value(String),
     /// Somebody else was faster.
     #[error("somebody has changed it meanwhile; look at what it is now")]
     Stale,
@@ -120,6 +124,9 @@ pub enum ChangeError {
     Disk(#[source] std::io::Error),
 }
 
+/// How many documents stay that were printed.
+const DOCUMENTS: usize = 20;
+
 /// The server.
 pub struct Server {
     /// What it was begun with.
@@ -127,6 +134,8 @@ pub struct Server {
     /// Its jobs on disk.
     pub store: Store,
     data: Mutex<Data>,
+    /// The sheet that somebody looks at.
+    pub(crate) seen: Mutex<Option<Seen>>,
     wake: Condvar,
     /// Whose turn it is to draw.
     pub drawing: Turns,
@@ -168,8 +177,10 @@ impl Server {
             if *job != before {
                 store.save(job)?;
             }
-            if job.state.is_over() {
-                store.clear(job.id, false)?;
+            match job.state {
+                State::Completed => store.clear_sheets(job.id),
+                state if state.is_over() => store.clear(job.id, false)?,
+                _ => {}
             }
         }
         let disk = Disk::of_free(durable::free(&settings.folder));
@@ -190,22 +201,26 @@ impl Server {
             kept,
             aside,
             again: None,
+            drawing: None,
             changed: now(),
             configured: now(),
             identify: 0,
             identified: None,
         };
-        Ok(Server {
+        let server = Server {
             settings,
             store,
             data: Mutex::new(data),
+            seen: Mutex::default(),
             wake: Condvar::new(),
             drawing: Turns::default(),
             disk,
             started: Instant::now(),
             observer,
             _lock: lock,
-        })
+        };
+        server.forget_documents(DOCUMENTS);
+        Ok(server)
     }
 
     /// All that changes. Not kept while anything is waited for.
@@ -257,6 +272,11 @@ impl Server {
         identity(&self.data(), of)
     }
 
+    /// The sheets of a job that are being drawn have come so far; `None` when they are all drawn.
+    pub(crate) fn draws(&self, id: u32, sheets: Option<usize>) {
+        self.data().drawing = sheets.map(|sheets| (id, sheets));
+    }
+
     /// What the delivery knows of jobs.
     pub fn sent(&self) -> PathBuf {
         self.settings.folder.join("sent")
@@ -303,6 +323,8 @@ impl Server {
             laid: Vec::new(),
             is_cut: false,
             awaits_switch: false,
+            round: 0,
+            lies: None,
         };
         self.store.save(&job)?;
         data.next += 1;
@@ -473,7 +495,13 @@ impl Server {
                 self.change(id, end)
             }
             ended => ended,
+        }?;
+        match state {
+            State::Completed => self.store.clear_sheets(id),
+            _ => self.store.clear(id, false)?,
         }
+        self.forget_documents(DOCUMENTS);
+        Ok(())
     }
 
     /// Nothing is printed now.
@@ -487,6 +515,9 @@ impl Server {
 
     /// A job that could not be kept waits again, and is tried after a while.
     pub(crate) fn try_again(&self, id: u32, why: &str, reason: Reason, after: Duration) {
+        if reason == Reason::SpoolAreaFull {
+            self.forget_documents(0);
+        }
         let mut data = self.data();
         if let Some(job) = data.jobs.get_mut(&id).filter(|job| job.state == State::Processing) {
             // On disk it is as it was, which a restart takes for the same.
@@ -600,12 +631,90 @@ impl Server {
         self.change(id, |job| match job.state {
             State::Pending | State::Held if !self.is_open(job) => {
                 (job.ticket.size, job.ticket.kind) = (Some(loaded.size), Some(loaded.kind));
-                // It is drawn again.
-                job.sheets = None;
+                job.is_drawn_again();
                 Ok(())
             }
             _ => Err(ChangeError::State("not waiting")),
         })
+    }
+
+    /// Changes what a job asks for before it is printed, by names and values of the desk.
+    ///
+    /// # Errors
+    /// It does not wait, or there is no such thing; then nothing has changed.
+    pub fn edit(
+        &self,
+        id: u32,
+        printer: Option<&Preset>,
+        changes: &[(String, String)],
+    ) -> Result<(), ChangeError> {
+        self.change(id, |job| match job.state {
+            State::Pending | State::Held if !self.is_open(job) && !job.cancel => {
+                if let Some(printer) = printer {
+                    job.printer.clone_from(&printer.name);
+                }
+                changes
+                    .iter()
+                    .try_for_each(|(name, value)| job.ticket.change(name, value))
+                    .map_err(ChangeError::Value)?;
+                job.is_drawn_again();
+                Ok(())
+            }
+            _ => Err(ChangeError::State("not waiting")),
+        })?;
+        self.store.clear_sheets(id);
+        Ok(())
+    }
+
+    /// A job that was printed, once more: another one with its document, which is held until somebody has
+    /// looked at it.
+    ///
+    /// # Errors
+    /// Its document is not there any more, or a new job cannot be kept.
+    pub fn again(&self, id: u32, owner: Owner) -> Result<u32, ChangeError> {
+        let job = self.data().jobs.get(&id).cloned().ok_or(ChangeError::NoJob)?;
+        let gone =
+            ChangeError::State("one whose document is not kept any more; print it again from its program");
+        let Some(from) = self.store.document(&job) else { return Err(gone) };
+        let printer = self
+            .printer(&job.printer)
+            .ok_or(ChangeError::State("for a printer that is not there any more"))?;
+        let ticket = Ticket { held: true, ..job.ticket.clone() };
+        let again = self.create(printer, &job.name, owner, ticket)?;
+        let to = self.store.folder(again).join(from.file_name().unwrap_or_default());
+        let kept = std::fs::hard_link(&from, &to).or_else(|_| std::fs::copy(&from, &to).map(|_| ()));
+        let kept = kept.map_err(ChangeError::Disk).and_then(|()| {
+            self.change(again, |new| {
+                (new.document, new.octets) = (job.document.clone(), job.octets);
+                new.format.clone_from(&job.format);
+                Ok(())
+            })?;
+            self.arrived(again)
+        });
+        if kept.is_err() {
+            self.forget(again);
+        }
+        kept.map(|()| again)
+    }
+
+    /// Removes the documents of jobs that were printed, but for the last `most` of them, and what documents
+    /// may take then.
+    pub(crate) fn forget_documents(&self, most: usize) {
+        let printed: Vec<Job> = {
+            let data = self.data();
+            let printed = data.jobs.values().filter(|job| job.state == State::Completed);
+            let mut printed: Vec<Job> = printed.cloned().collect();
+            printed.sort_by_key(|job| std::cmp::Reverse((job.ended, job.id)));
+            printed
+        };
+        let (mut octets, mut count) = (0, 0);
+        for job in printed.iter().filter(|job| self.store.document(job).is_some()) {
+            (octets, count) = (octets + job.octets, count + 1);
+            if count > most || octets > self.disk.printed() {
+                // What stays now is removed the next time.
+                let _ = self.store.clear(job.id, false);
+            }
+        }
     }
 
     /// Waits for the next job to print; it is processing then. One for another sheet than the loaded one is

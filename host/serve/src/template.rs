@@ -6,16 +6,19 @@
 //! Limits: a sheet has one side and no finishings.
 //! Source: RFC 8011, section 5.2; PWG 5100.3, 5100.7 and 5101.1.
 
+use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
 use ipp::value::IppValue;
+use protocol::ink::Ink;
 use protocol::paper::Paper;
 use serde::{Deserialize, Serialize};
 
 use crate::values::{each, read_text};
-use make::options::{Choices, of_attribute};
+use make::options::{Choices, PAGE, of_attribute};
 use press::layout::fit::{Scaling, Wish};
 use press::layout::paper::{custom_margins, custom_range, sheet_mm, table};
+use press::layout::{Mm, Point};
 use queue::ppd::paper_of;
 use sheet::Turn;
 
@@ -48,6 +51,11 @@ pub fn supported(attribute: &str) -> impl Iterator<Item = &'static str> {
     let own = OWN.into_iter().find(|(known, _)| *known == attribute).map_or(&[][..], |row| row.1);
     own.iter().copied().chain(of_attribute(attribute).map(|(keyword, _)| keyword))
 }
+
+/// The most ranges of pages that somebody types.
+const MOST_RANGES: usize = 100;
+/// Farther than any sheet reaches, in millimetres.
+const MOST_MM: f64 = 10_000.0;
 
 /// The most copies.
 pub const MOST_COPIES: i32 = 99;
@@ -88,7 +96,8 @@ pub struct Loaded {
     pub kind: String,
 }
 
-fn hundredths(mm: f64) -> i32 {
+/// A length in millimetres, in hundredths of one.
+pub(crate) fn hundredths(mm: f64) -> i32 {
     // Sheets are less than half a metre.
     #[expect(clippy::cast_possible_truncation, reason = "within the size of a sheet")]
     let number = (mm * 100.0).round() as i32;
@@ -99,6 +108,11 @@ fn hundredths(mm: f64) -> i32 {
 pub fn sheets() -> impl Iterator<Item = (&'static str, Size)> {
     let photo = ("na_index-4x6_4x6in", (10160, 15240));
     SHEETS.into_iter().map(|(keyword, paper)| (keyword, size(paper))).chain([photo])
+}
+
+/// A length of hundredths of a millimetre.
+fn mm(hundredths: i32) -> Mm {
+    Mm(f64::from(hundredths) / 100.0)
 }
 
 /// The size of a paper.
@@ -193,6 +207,14 @@ pub struct Ticket {
     pub pages: Vec<(i32, i32)>,
     /// Whether it waits until it is released.
     pub held: bool,
+    /// Where the page's corner goes, from that of the sheet, in hundredths of a millimetre.
+    pub at: Option<(i32, i32)>,
+    /// How wide it is as it lies, in hundredths of a millimetre.
+    pub wide: Option<u32>,
+    /// Passes of white.
+    pub white_passes: Option<u8>,
+    /// What no dialog shows, by the keywords of [`make::options::PAGE`] and their values.
+    pub own: BTreeMap<String, String>,
 }
 
 impl Default for Ticket {
@@ -210,6 +232,10 @@ impl Default for Ticket {
             must_fit: false,
             pages: Vec::new(),
             held: false,
+            at: None,
+            wide: None,
+            white_passes: None,
+            own: BTreeMap::new(),
         }
     }
 }
@@ -341,6 +367,77 @@ impl Ticket {
         self.pages.iter().map(|&(from, to)| page(from)..=page(to)).collect()
     }
 
+    /// Somebody changes one thing at the desk, by its name there; nothing for the value that is usual.
+    ///
+    /// # Errors
+    /// In words: no such thing, or a value that it cannot have.
+    pub fn change(&mut self, name: &str, value: &str) -> Result<(), String> {
+        let wrong = |expected: &str| format!("{name}: expected {expected}, not `{value}`");
+        let hundredths_of = |text: &str| {
+            let number = text.trim().parse::<f64>().ok().filter(|mm| mm.abs() <= MOST_MM);
+            number.map(hundredths)
+        };
+        match name {
+            "scaling" => {
+                let known = self.ask("print-scaling", value);
+                self.wide = None;
+                if !known {
+                    return Err(wrong("auto, fit, fill or none"));
+                }
+            }
+            "wide" => {
+                let wide = hundredths_of(value).and_then(|wide| u32::try_from(wide).ok());
+                self.wide = Some(wide.filter(|wide| *wide > 0).ok_or_else(|| wrong("millimetres"))?);
+            }
+            "at" if value.is_empty() => self.at = None,
+            "at" => {
+                let two = value.split_once(',');
+                let at = two.and_then(|(x, y)| Some((hundredths_of(x)?, hundredths_of(y)?)));
+                self.at = Some(at.ok_or_else(|| wrong("two numbers of millimetres, such as 20,35.5"))?);
+            }
+            "orientation" => {
+                let known = value.parse().ok().filter(|asked| ORIENTATIONS.iter().any(|(o, _)| o == asked));
+                self.orientation = Some(known.ok_or_else(|| wrong("a number from 3 to 7"))?);
+            }
+            "copies" => {
+                let most = u32::try_from(MOST_COPIES).unwrap_or(u32::MAX);
+                let copies = value.parse().ok().filter(|copies| (1..=most).contains(copies));
+                self.copies = copies.ok_or_else(|| wrong(&format!("a number from 1 to {MOST_COPIES}")))?;
+            }
+            "pages" => {
+                let range = |text: &str| {
+                    let (from, to) = text.split_once('-').unwrap_or((text, text));
+                    let (from, to) = (from.trim().parse().ok()?, to.trim().parse().ok()?);
+                    (1 <= from && from <= to).then_some((from, to))
+                };
+                let pages = value.split(',').filter(|text| !text.trim().is_empty()).map(range);
+                let pages: Option<Vec<(i32, i32)>> = pages.take(MOST_RANGES).collect();
+                self.pages = pages.ok_or_else(|| wrong("pages, such as 1-3,7"))?;
+            }
+            "quality" if value.is_empty() => self.quality = None,
+            "quality" if !self.ask("print-quality", value) => return Err(wrong("3, 4 or 5")),
+            "quality" => {}
+            "white-passes" if value.is_empty() => self.white_passes = None,
+            "white-passes" => {
+                let passes = value.parse().ok().filter(|passes| (1..=9).contains(passes));
+                self.white_passes = Some(passes.ok_or_else(|| wrong("a number from 1 to 9"))?);
+            }
+            _ => {
+                let option = PAGE.iter().find(|option| option.keyword == name);
+                let option = option.ok_or_else(|| format!("there is no such option: {name}"))?;
+                if value.is_empty() {
+                    self.own.remove(name);
+                } else {
+                    option
+                        .choose(value, &mut Choices::default())
+                        .ok_or_else(|| wrong("one of its values"))?;
+                    self.own.insert(name.into(), value.into());
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// What a preset's printer draws for this job.
     pub fn choices(&self, preset: &Choices) -> Choices {
         let mut choices = preset.clone();
@@ -359,13 +456,22 @@ impl Ticket {
                 (value.set)(&mut choices);
             }
         }
+        for (keyword, value) in &self.own {
+            // What is not known any more is left as the preset has it.
+            let _ =
+                PAGE.iter().find(|option| option.keyword == keyword).map(|o| o.choose(value, &mut choices));
+        }
+        if let Some(passes) = self.white_passes {
+            choices.more.passes.retain(|(ink, _)| *ink != Ink::White);
+            choices.more.passes.push((Ink::White, passes));
+        }
         let turn = |asked| ORIENTATIONS.iter().find(|(known, _)| *known == asked).and_then(|(_, turn)| *turn);
         let usual = preset.fit.unwrap_or_default();
         choices.fit = Some(Wish {
-            scaling: self.scaling.unwrap_or(usual.scaling),
+            scaling: self.wide.map_or(self.scaling.unwrap_or(usual.scaling), Scaling::Wide),
+            corner: self.at.map(|(x, y)| Point(mm(x), mm(y))).or(usual.corner),
             turn: self.orientation.map_or(usual.turn, turn),
             must_fit: self.must_fit,
-            ..usual
         });
         choices.pages = self.pages();
         if let Some(paper) = self.size.and_then(paper) {
@@ -382,7 +488,6 @@ mod tests {
     use art::{Intent, White};
     use halftone::Method;
     use inks::InkSet;
-    use protocol::ink::Ink;
     use protocol::rgl::Media;
 
     #[test]
@@ -443,6 +548,59 @@ mod tests {
             ..preset
         };
         assert_eq!(asked, expected);
+    }
+
+    #[test]
+    fn what_is_changed_at_the_desk_is_drawn() {
+        let mut ticket = Ticket::default();
+        for (name, value) in [
+            ("wide", "85.5"),
+            ("at", "20, 35.25"),
+            ("orientation", "4"),
+            ("copies", "3"),
+            ("pages", "1-2, 5"),
+            ("white-passes", "2"),
+            ("FoilpressWhite", "Under"),
+            ("MirrorPrint", "True"),
+        ] {
+            ticket.change(name, value).unwrap();
+        }
+        let more = art::Settings { passes: vec![(Ink::White, 2)], ..Choices::default().more };
+        let expected = Choices {
+            white: White::Under,
+            mirror: true,
+            pages: vec![1..=2, 5..=5],
+            fit: Some(Wish {
+                scaling: Scaling::Wide(8550),
+                turn: Some(Turn::Left),
+                corner: Some(Point(Mm(20.0), Mm(35.25))),
+                must_fit: false,
+            }),
+            more,
+            ..Choices::default()
+        };
+        assert_eq!((ticket.copies, ticket.choices(&Choices::default())), (3, expected));
+        for (name, value) in [
+            ("scaling", "huge"),
+            ("wide", "-3"),
+            ("at", "20"),
+            ("at", "1e9,0"),
+            ("orientation", "9"),
+            ("copies", "0"),
+            ("pages", "3-2"),
+            ("white-passes", "10"),
+            ("FoilpressWhite", "Everywhere"),
+            ("colour", "red"),
+        ] {
+            assert!(ticket.clone().change(name, value).is_err(), "{name} {value}");
+        }
+        for name in ["at", "white-passes", "FoilpressWhite", "MirrorPrint", "pages"] {
+            ticket.change(name, "").unwrap();
+        }
+        ticket.change("scaling", "auto").unwrap();
+        let plain =
+            Ticket { copies: 3, orientation: Some(4), scaling: Some(Scaling::Auto), ..Ticket::default() };
+        assert_eq!(ticket, plain);
     }
 
     #[test]

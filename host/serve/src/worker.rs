@@ -10,12 +10,10 @@
 //! Cost: one page in memory; the sheets of one job on disk.
 //! Limits: one device, one job at a time.
 
-use std::borrow::Cow;
 use std::error::Error;
 use std::fs;
 use std::io::{self, Read, Write};
-use std::path::{Path, PathBuf};
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::path::PathBuf;
 use std::thread;
 use std::time::Duration;
 
@@ -26,12 +24,15 @@ use protocol::ink::Ink;
 
 use crate::budget::{Purpose, Turn};
 use crate::jobs::{Job, State};
+use crate::making::Making;
+use crate::seen;
 use crate::server::{Cartridge, ChangeError, Server};
 use crate::spool::JOB;
+use crate::template::hundredths;
 use crate::values::now;
 use device::questions::status::Status;
 use make::options::is_chosen;
-use queue::backend::{self, Sheets};
+use queue::backend::{self, Sheets as _};
 use queue::call::{Call, Exit};
 use queue::filter::{self, FilterError, Filtered};
 use queue::messages::{Reason, Report, colour};
@@ -44,7 +45,7 @@ pub fn work(server: &Server) -> ! {
     let mut again = AGAIN.0;
     loop {
         let job = server.next();
-        let voice = Voice { server, id: job.id };
+        let voice = Voice { server, id: job.id, purpose: Purpose::Print };
         let ended = print(server, &job, &voice);
         server.rests();
         let Err(why) = ended else {
@@ -94,7 +95,7 @@ fn print(server: &Server, job: &Job, voice: &Voice<'_>) -> Result<(), Unfinished
     let making = Making::of(&server.store.sheets(&job));
     let stop = || voice.is_cancelled();
     let ((exit, whole), drawn) = thread::scope(|scope| {
-        let drawing = scope.spawn(|| draw_for(server, &job, voice, &making, Purpose::Print));
+        let drawing = scope.spawn(|| draw_for(server, &job, voice, &making));
         let sent = backend::deliver(&call, &server.settings.devices, &making, voice, &stop, &stop);
         making.enough();
         (sent, drawing.join().unwrap_or_else(|_| Err(Undrawn::Document("it cannot be drawn".into()))))
@@ -107,7 +108,11 @@ fn print(server: &Server, job: &Job, voice: &Voice<'_>) -> Result<(), Unfinished
             let why = unfinished(server, &job, &why);
             end(server, &call, voice, State::Aborted, &why)
         }
-        (Exit::Ok, Ok(())) if whole => end(server, &call, voice, State::Completed, &voice.printed()),
+        (Exit::Ok, Ok(())) if whole => {
+            // A picture for those who look for it later; a job is printed without one, too.
+            let _ = seen::keep_picture(&server.seen, &server.store, &job, &making);
+            end(server, &call, voice, State::Completed, &voice.printed())
+        }
         (Exit::Ok, Ok(())) => end(server, &call, voice, State::Canceled, "cancelled"),
         (Exit::Cancel, _) => end(server, &call, voice, State::Aborted, &voice.last()),
         (Exit::Failed | Exit::Stop, _) if voice.lacks_space() => Err(Unfinished::Full),
@@ -152,7 +157,7 @@ fn end(server: &Server, call: &Call, voice: &Voice<'_>, state: State, why: &str)
     if !backend::is_open(&call.to, &call.journal.join(&call.identity)) {
         backend::forget(call, voice);
     }
-    Ok(server.store.clear(voice.id, false).map_err(ChangeError::from)?)
+    Ok(())
 }
 
 /// A job whose sheet is decided, as it is when the job is drawn first, and stays known.
@@ -176,7 +181,8 @@ fn fixed(server: &Server, id: u32) -> Result<Job, ChangeError> {
 pub fn prepare(server: &Server, id: u32) -> Result<Making, String> {
     let job = fixed(server, id).map_err(|error| server.without_places(&with_causes(&error)))?;
     let making = Making::of(&server.store.sheets(&job));
-    match draw_for(server, &job, &Voice { server, id }, &making, Purpose::Look) {
+    let voice = Voice { server, id, purpose: Purpose::Look };
+    match draw_for(server, &job, &voice, &making) {
         Ok(()) => Ok(making),
         Err(Undrawn::Full) => Err(FULL.into()),
         Err(Undrawn::Enough) => Err("the job is printed or cancelled".into()),
@@ -213,15 +219,10 @@ impl From<io::Error> for Undrawn {
 }
 
 /// Makes the sheets of a job unless they are there, and puts on record that all of them are.
-fn draw_for(
-    server: &Server,
-    job: &Job,
-    voice: &Voice<'_>,
-    making: &Making,
-    purpose: Purpose,
-) -> Result<(), Undrawn> {
+fn draw_for(server: &Server, job: &Job, voice: &Voice<'_>, making: &Making) -> Result<(), Undrawn> {
     let _over = making.until_over();
-    let turn = server.drawing.take(purpose);
+    let turn = server.drawing.take(voice.purpose);
+    let _told = Told(server);
     let known = server.data().jobs.get(&job.id).cloned();
     let known = known.ok_or_else(|| Undrawn::Document("there is no such job".into()))?;
     if known.sheets.is_some_and(|sheets| making.holds(sheets / job.ticket.copies.max(1))) {
@@ -233,19 +234,29 @@ fn draw_for(
     let drawn = draw(server, job, &mut SheetFiles { count: 0, making, voice, turn: &turn })?;
     let count = u32::try_from(making.count()).unwrap_or(u32::MAX);
     let kept = server.change(job.id, |kept| {
-        // Meanwhile somebody may have laid it on another sheet.
-        if kept.ticket == job.ticket {
+        // Meanwhile somebody may have changed it.
+        if kept.round == job.round {
             kept.sheets = Some(count.saturating_mul(job.ticket.copies));
             (kept.laid, kept.is_cut) = (drawn.laid, drawn.is_cut);
+            kept.lies = drawn.lies.map(|lies| [lies.left, lies.top, lies.width, lies.length].map(hundredths));
         }
         Ok(())
     });
     kept.map_err(|error| Undrawn::of(&error))
 }
 
+/// Nothing is drawn any more when this is dropped.
+struct Told<'a>(&'a Server);
+
+impl Drop for Told<'_> {
+    fn drop(&mut self) {
+        self.0.draws(0, None);
+    }
+}
+
 /// Makes the sheets of a job, and says how its pages lie.
 fn draw(server: &Server, job: &Job, out: &mut SheetFiles<'_>) -> Result<Filtered, Undrawn> {
-    durable::make_folder(&out.making.folder, Access::Private)?;
+    durable::make_folder(out.making.folder(), Access::Private)?;
     let document = job.document.as_deref();
     let document = document.ok_or_else(|| Undrawn::Document("the job has no document".into()))?;
     let path = server.store.folder(job.id).join(document);
@@ -316,7 +327,7 @@ impl SheetFiles<'_> {
 
     /// Whether nobody wants more.
     fn is_enough(&self) -> bool {
-        self.voice.is_cancelled() || self.making.state().is_enough
+        self.voice.is_cancelled() || self.making.is_enough()
     }
 }
 
@@ -330,6 +341,7 @@ impl Write for SheetFiles<'_> {
             return Err(io::Error::other("nobody wants it any more"));
         }
         self.count += 1;
+        self.voice.server.draws(self.voice.id, Some(self.count));
         if self.count > self.making.count() {
             let path = self.making.path(self.count);
             durable::write(&path, sheet, Access::Private)?;
@@ -343,89 +355,11 @@ impl Write for SheetFiles<'_> {
     }
 }
 
-/// The sheets of a job in a folder, while they are made.
-pub struct Making {
-    folder: PathBuf,
-    state: Mutex<MakingState>,
-    more: Condvar,
-}
-
-#[derive(Default)]
-struct MakingState {
-    /// Sheets that are there.
-    count: usize,
-    /// Whether no more will come.
-    is_over: bool,
-    /// Whether nobody wants more.
-    is_enough: bool,
-}
-
-impl Making {
-    /// With those that are there.
-    fn of(folder: &Path) -> Making {
-        let making = Making { folder: folder.to_path_buf(), state: Mutex::default(), more: Condvar::new() };
-        let count = (1..).take_while(|&number| making.path(number).exists()).count();
-        making.has(count);
-        making
-    }
-
-    fn state(&self) -> MutexGuard<'_, MakingState> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// The file of a sheet, from 1.
-    fn path(&self, number: usize) -> PathBuf {
-        self.folder.join(format!("{number:05}.rgl"))
-    }
-
-    /// So many sheets are there.
-    fn has(&self, count: usize) {
-        self.state().count = count;
-        self.more.notify_all();
-    }
-
-    /// Whether so many sheets are there.
-    fn holds(&self, count: u32) -> bool {
-        self.state().count >= usize::try_from(count).unwrap_or(usize::MAX)
-    }
-
-    /// Nobody wants more.
-    fn enough(&self) {
-        self.state().is_enough = true;
-    }
-
-    /// No more will come once what is given back is dropped.
-    fn until_over(&self) -> impl Drop + use<'_> {
-        struct Over<'a>(&'a Making);
-        impl Drop for Over<'_> {
-            fn drop(&mut self) {
-                self.0.state().is_over = true;
-                self.0.more.notify_all();
-            }
-        }
-        Over(self)
-    }
-}
-
-impl Sheets for Making {
-    fn count(&self) -> usize {
-        self.state().count
-    }
-
-    fn sheet(&self, index: usize) -> io::Result<Option<Cow<'_, [u8]>>> {
-        let mut state = self.state();
-        while state.count <= index && !state.is_over {
-            state = self.more.wait(state).unwrap_or_else(PoisonError::into_inner);
-        }
-        let is_there = state.count > index;
-        drop(state);
-        is_there.then(|| Ok(Cow::Owned(fs::read(self.path(index + 1))?))).transpose()
-    }
-}
 /// What is told of a job becomes its state and the printers'.
 struct Voice<'a> {
     server: &'a Server,
     id: u32,
+    purpose: Purpose,
 }
 
 impl Voice<'_> {
@@ -460,11 +394,13 @@ impl Voice<'_> {
     fn say(&self, text: &str) {
         let text = &self.server.without_places(text);
         let mut data = self.server.data();
-        data.message = text.into();
+        if self.purpose == Purpose::Print {
+            data.message.clone_from(text);
+        }
         data.changed = now();
         // On disk with the job's next state; until then it is for whoever asks.
         if let Some(job) = data.jobs.get_mut(&self.id) {
-            job.message = text.into();
+            job.message.clone_from(text);
         }
     }
 }

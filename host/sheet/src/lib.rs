@@ -109,6 +109,11 @@ impl Sheet {
         rows.flat_map(|row| std::iter::repeat_n(row, times)).collect::<Vec<_>>().concat().into()
     }
 
+    /// All of it.
+    pub fn whole(&self) -> Area {
+        Area { left: 0, top: 0, width: self.width(), length: self.length() }
+    }
+
     /// How many dots each stack has.
     pub fn census(&self) -> Vec<u64> {
         self.dots.census()

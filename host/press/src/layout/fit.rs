@@ -33,10 +33,12 @@ pub enum Scaling {
     Fill,
     /// As it is, whatever of it is cut.
     None,
+    /// So wide as it lies then, in hundredths of a millimetre.
+    Wide(u32),
 }
 
 impl Scaling {
-    /// All of them.
+    /// All that have a name of their own.
     pub const ALL: [Scaling; 5] =
         [Scaling::Auto, Scaling::AutoFit, Scaling::Fit, Scaling::Fill, Scaling::None];
 
@@ -48,7 +50,7 @@ impl Scaling {
             Scaling::AutoFit => "auto-fit",
             Scaling::Fit => "fit",
             Scaling::Fill => "fill",
-            Scaling::None => "none",
+            Scaling::None | Scaling::Wide(_) => "none",
         }
     }
 }
@@ -165,6 +167,7 @@ impl Room {
         let within = |room: (f64, f64), more: f64| page.0 <= room.0 + more && page.1 <= room.1 + more;
         match (wish.scaling, edge) {
             (Scaling::None, _) => (1.0, false),
+            (Scaling::Wide(width), _) => (f64::from(width) / 100.0 / page.0, false),
             (Scaling::Fit, _) => (self.fit(page), true),
             (Scaling::Fill, _) => ((self.sheet.0 / page.0).max(self.sheet.1 / page.1), false),
             (_, Edge::Margin) if self.is_size_of(page) => (1.0, false),
@@ -300,6 +303,15 @@ mod tests {
         // A whole A4 picture on a postcard: its length is the printable length.
         let card = on(Paper::Postcard, (210.0, 297.0), Content, Scaling::Auto);
         assert_eq!((card.turn, (297.0 * card.scale * 600.0 / 25.4).round()), (Turn::None, 3082.0));
+    }
+
+    #[test]
+    fn a_page_is_as_wide_as_it_is_wished_to_be_the_way_it_lies() {
+        let wide = |turn| Wish { scaling: Scaling::Wide(5000), turn: Some(turn), ..Wish::default() };
+        for (turn, scale) in [(Turn::None, 50.0 / 85.0), (Turn::Left, 50.0 / 54.0)] {
+            let found = fit((85.0, 54.0), Edge::Content, Paper::A4, &wide(turn)).unwrap();
+            assert!((found.scale - scale).abs() < 1e-9, "{found:?}");
+        }
     }
 
     #[test]

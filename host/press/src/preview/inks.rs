@@ -86,15 +86,24 @@ pub fn pass_in_ink(pass: &Pass, area: Area, across: usize, ground: Ground) -> io
     encoded((area.width, area.length * across), square(across), Exact::Two(&palette), &bits)
 }
 
-/// A picture of the whole sheet, which has `across` dots in 1/600 inch; at most `longest` pixels on its longer side. Each
-/// pixel is the mean of its dots.
-pub fn thumbnail(sheet: &Sheet, across: usize, ground: Ground, longest: usize) -> Pixels<[u8; 3]> {
+/// A picture of an area of a sheet, which has `across` dots in 1/600 inch; at most `longest` pixels on its longer side.
+/// Each pixel is the mean of its dots.
+///
+/// # Panics
+/// If the area leaves the sheet, which is a bug of the caller.
+pub fn thumbnail(
+    sheet: &Sheet,
+    area: Area,
+    across: usize,
+    ground: Ground,
+    longest: usize,
+) -> Pixels<[u8; 3]> {
     let palette: Vec<[u8; 3]> = sheet.stacks().iter().map(|stack| upon(stack, ground.0)).collect();
-    let step = (sheet.width() / across).max(sheet.length()).div_ceil(longest.max(1)).max(1);
+    let step = (area.width / across).max(area.length).div_ceil(longest.max(1)).max(1);
     let wide = step * across;
-    let (width, height) = (sheet.width().div_ceil(wide), sheet.length().div_ceil(step));
+    let (width, height) = (area.width.div_ceil(wide), area.length.div_ceil(step));
     let mut sums = vec![[0u32; 4]; width * height];
-    for (y, row) in sheet.index().chunks_exact(sheet.width()).enumerate() {
+    for (y, row) in sheet.index_of(area, 1).chunks_exact(area.width.max(1)).enumerate() {
         for (sum, dots) in sums[y / step * width..].iter_mut().zip(row.chunks(wide)) {
             for &dot in dots {
                 let colour = palette[usize::from(dot)];
@@ -222,7 +231,7 @@ mod tests {
 
     #[test]
     fn a_thumbnail_keeps_the_mean() {
-        let small = thumbnail(&sheet(), 1, Ground([0; 3]), 10);
+        let small = thumbnail(&sheet(), sheet().whole(), 1, Ground([0; 3]), 10);
         assert_eq!(small.size(), (10, 6));
         let white = f64::from(upon(&"W".parse().unwrap(), [0; 3])[0]);
         // Dots 4 and 5: half ground, half white.

@@ -7,7 +7,7 @@ use inks::Library;
 use protocol::ink::{Ink, Kind};
 use protocol::paper::Paper;
 
-use super::{FilterError, Filtered, io_error};
+use super::{FilterError, Filtered, Lies, io_error};
 use crate::ppd;
 use art::pdf::Part;
 use art::{Artwork, Window};
@@ -37,6 +37,8 @@ pub(super) struct Press<'a> {
     /// How pages lie: in words, the first of them, and how many there are.
     said: Vec<(String, usize, usize)>,
     is_cut: bool,
+    /// Where the first page lies that is printed.
+    lies: Option<Lies>,
 }
 
 /// What a page is.
@@ -78,6 +80,7 @@ impl<'a> Press<'a> {
             in_margins: None,
             said: Vec::new(),
             is_cut: false,
+            lies: None,
         }
     }
 
@@ -87,7 +90,12 @@ impl<'a> Press<'a> {
             1 => format!("page {first}: {words}"),
             _ => format!("page {first} and {} more: {words}", count - 1),
         };
-        Filtered { jobs: self.jobs, laid: self.said.iter().map(words).collect(), is_cut: self.is_cut }
+        Filtered {
+            jobs: self.jobs,
+            laid: self.said.iter().map(words).collect(),
+            is_cut: self.is_cut,
+            lies: self.lies,
+        }
     }
 
     /// Says how a page lies, once for all pages of which it is true.
@@ -128,8 +136,8 @@ impl<'a> Press<'a> {
         let wish = match (of, wish) {
             (Of::Document, wish) => wish,
             // Whoever has drawn it has turned and scaled it, too.
-            (Of::Raster, Wish { scaling: Scaling::None, corner, .. }) => {
-                Wish { scaling: Scaling::None, corner, ..Wish::default() }
+            (Of::Raster, Wish { scaling: scaling @ (Scaling::None | Scaling::Wide(_)), corner, .. }) => {
+                Wish { scaling, corner, ..Wish::default() }
             }
             (Of::Raster, Wish { corner, .. }) => Wish { corner, ..Wish::default() },
         };
@@ -222,6 +230,7 @@ impl<'a> Press<'a> {
         let layout = Layout { position, ..self.settings(laid.paper, mirrored).page.layout };
         let sides = (dots(drawn.width), dots(drawn.height));
         let side = |dots: i64| usize::try_from(dots).unwrap_or(0);
+        let whole = size;
         let size = (side(sides.0), side(sides.1));
         let ((x, y), beyond) = layout.placed(size).map_err(in_layout)?;
         let (width, length) = (Mm::of_dots(sides.0).0, Mm::of_dots(sides.1).0);
@@ -236,6 +245,11 @@ impl<'a> Press<'a> {
         }
         if !words.is_empty() {
             self.say(number, words.into());
+        }
+        let mm = |pixels: usize| 25.4 * pixels as f64 / dpi;
+        if laid.place == Place::Page {
+            let Point(Mm(left), Mm(top)) = laid.fit.corner;
+            self.lies.get_or_insert(Lies { left, top, width: mm(whole.0), length: mm(whole.1) });
         }
         if let Some(cut) = beyond {
             self.is_cut = true;

@@ -128,9 +128,11 @@ pub fn attributes(
         ("print-rendering-intent", word(&ticket.intent, AUTO)),
         ("print-color-mode", word(&ticket.colour, AUTO)),
         ("print-scaling", keyword(ticket.scaling.unwrap_or_default().name())),
-        ("orientation-requested", IppValue::Enum(ticket.orientation.unwrap_or(NO_ORIENTATION))),
         ("printer-resolution", dpi(if ticket.quality == Some(3) { 300 } else { 600 })),
     ];
+    if let Some(asked) = ticket.orientation.filter(|asked| *asked != NO_ORIENTATION) {
+        all.push(("orientation-requested", IppValue::Enum(asked)));
+    }
     let loaded = data.loaded();
     let size = ticket.size.unwrap_or(loaded.size);
     let kind = ticket.kind.as_deref().unwrap_or(&loaded.kind);

@@ -66,6 +66,8 @@ pub struct Data {
     pub(super) kept: Kept,
     /// What could not be read at the start, in words.
     pub aside: Vec<String>,
+    /// The job whose sheets are being drawn, and how many are.
+    pub drawing: Option<(u32, usize)>,
     /// When a job that could not be kept is tried again.
     pub(super) again: Option<Instant>,
     /// When any of this changed, in seconds since 1970.

@@ -1,9 +1,11 @@
-//! Requests as devices make them that cannot be had here: an iPhone, a computer with Windows 11, an Android phone.
+//! Requests as devices make them that cannot be had here: an iPhone, a computer with Windows 11, an Android
+//! phone, a Chromebook; and as CUPS makes them. What is printed is judged by inks and by places.
 //!
-//! These are not recordings. They are written from what is public of each: the order of operations, the attributes and their types, the
-//! format of documents, and how HTTP carries them. Source: for iOS the traces in OpenPrinting/cups#126 and Apple's Bonjour Printing
-//! Specification; for Windows michaelrsweet/lprint#93 and OpenPrinting/cups#859; for Android the open source of its print service
-//! (`ipphelper.c`).
+//! These are not recordings. They are written from what is public of each: the order of operations, the
+//! attributes and their types, the format of documents, and how HTTP carries them. Source: for iOS the traces
+//! in OpenPrinting/cups#126 and Apple's Bonjour Printing
+//! Specification; for Windows michaelrsweet/lprint#93 and OpenPrinting/cups#859; for Android the open source
+//! of its print service (`ipphelper.c`).
 
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
@@ -12,9 +14,12 @@ use std::time::{Duration, Instant};
 
 use observe::Silent;
 use press::inspect::inspect;
+use protocol::ink::Ink;
+use protocol::paper::{LEFT, Paper};
 use serve::body::Limits;
 use serve::jobs::State;
 use testing::ipp::{self, Attribute};
+use testing::needs::ghostscript;
 use testing::pwg::{self, Kind};
 
 use super::Running;
@@ -50,15 +55,40 @@ struct Device {
     /// What it wants of its job, and what of it is not possible here and said to be so.
     job: Vec<Attribute<'static>>,
     ignored: &'static [&'static str],
+    is_colour: bool,
 }
 
-/// A page of 4 x 6 inches with a black field, at a resolution.
+/// A page of 4 x 6 inches with a black field of an inch at 1, 1, and a red one of half an inch at 2.5, 3, at
+/// a resolution. Of the latter a client without colours draws nothing here.
 fn raster(kind: Kind, dpi: u32) -> Vec<u8> {
-    let field = |x: u32, y: u32| match (dpi..2 * dpi).contains(&x) && (dpi..2 * dpi).contains(&y) {
-        true => [0; 3],
-        false => [255; 3],
+    let within = |at: u32, from: u32, side: u32| (from * dpi / 2..(from + side) * dpi / 2).contains(&at);
+    let field = |x: u32, y: u32| match () {
+        () if within(x, 2, 2) && within(y, 2, 2) => [0; 3],
+        () if within(x, 5, 1) && within(y, 6, 1) => [255, 0, 0],
+        () => [255; 3],
     };
     pwg::document(kind, dpi, (4 * dpi, 6 * dpi), 10, &[&field])
+}
+
+/// The same as PDF; lying on its side if it is to be turned, as a program writes it.
+fn pdf(is_turned: bool) -> Vec<u8> {
+    let (box_, turn) = if is_turned { ("0 0 432 288", "0 -1 1 0 0 288 cm") } else { ("0 0 288 432", "") };
+    let drawing = format!("{turn} 0 g 72 288 72 72 re f 1 0 0 rg 180 180 36 36 re f");
+    let objects = [
+        "<</Type/Catalog/Pages 2 0 R>>".to_owned(),
+        "<</Type/Pages/Kids[3 0 R]/Count 1>>".to_owned(),
+        format!("<</Type/Page/Parent 2 0 R/MediaBox[{box_}]/Contents 4 0 R>>"),
+        format!("<</Length {}>>\nstream\n{drawing}\nendstream", drawing.len()),
+    ];
+    let (mut text, mut places) = (String::from("%PDF-1.4\n"), String::new());
+    for (number, object) in (1..).zip(&objects) {
+        places += &format!("{:010} 00000 n \n", text.len());
+        text += &format!("{number} 0 obj\n{object}\nendobj\n");
+    }
+    let at = text.len();
+    text += &format!("xref\n0 5\n0000000000 65535 f \n{places}");
+    text += &format!("trailer\n<</Size 5/Root 1 0 R>>\nstartxref\n{at}\n%%EOF\n");
+    text.into_bytes()
 }
 
 /// The same as Apple raster: rows are packed alike, and the header is shorter.
@@ -92,7 +122,7 @@ fn media(more: &[Attribute<'static>]) -> Vec<Attribute<'static>> {
     all
 }
 
-fn devices() -> [Device; 3] {
+fn devices() -> [Device; 6] {
     const ZERO: &[u8] = &0i32.to_be_bytes();
     const ONE: &[u8] = &1i32.to_be_bytes();
     const UPRIGHT: &[u8] = &3i32.to_be_bytes();
@@ -124,6 +154,7 @@ fn devices() -> [Device; 3] {
             ]
             .concat(),
             ignored: &[],
+            is_colour: true,
         },
         Device {
             name: "Windows",
@@ -144,6 +175,7 @@ fn devices() -> [Device; 3] {
             ]
             .concat(),
             ignored: &["multiple-document-handling"],
+            is_colour: true,
         },
         Device {
             name: "Android",
@@ -163,8 +195,52 @@ fn devices() -> [Device; 3] {
             ]
             .concat(),
             ignored: &[],
+            is_colour: false,
         },
+        cups("CUPS", "CUPS/2.4.2 (Linux 6.1; x86_64) IPP/2.0", pdf(false), vec![]),
+        // A page on its side is turned here.
+        cups("CUPS, landscape", "CUPS/2.4.2 (Linux 6.1; x86_64) IPP/2.0", pdf(true), vec![]),
+        cups(
+            "ChromeOS",
+            "CUPS/2.3.3 (CrOS 16093; x86_64) IPP/2.0",
+            pdf(false),
+            vec![
+                (0x44, "print-color-mode", b"color"),
+                (0x32, "printer-resolution", b"\0\0\x02\x58\0\0\x02\x58\x03"),
+            ],
+        ),
     ]
+}
+
+/// What CUPS asks for a document that it passes on as it is: all that its `ipp` backend makes of the options
+/// of a job.
+fn cups(name: &'static str, agent: &'static str, document: Vec<u8>, more: Vec<Attribute<'static>>) -> Device {
+    const ONE: &[u8] = &1i32.to_be_bytes();
+    const NORMAL: &[u8] = &4i32.to_be_bytes();
+    let source: [Attribute<'static>; 4] = [
+        (0x4a, "", b"media-source"),
+        (0x44, "", b"auto"),
+        (0x4a, "", b"media-type"),
+        (0x44, "", b"stationery"),
+    ];
+    let job: Vec<Attribute<'static>> = vec![
+        (0x21, "copies", ONE),
+        (0x23, "print-quality", NORMAL),
+        (0x44, "sides", b"one-sided"),
+        (0x44, "multiple-document-handling", b"separate-documents-uncollated-copies"),
+    ];
+    Device {
+        name,
+        agent,
+        carried: Carried::Chunks,
+        version: [2, 0],
+        asks: &["all", "media-col-database"],
+        format: "application/pdf",
+        document,
+        job: [media(&source), job, more].concat(),
+        ignored: &[],
+        is_colour: true,
+    }
 }
 
 /// Sends a request as a device does; the answer's status and bytes.
@@ -225,6 +301,9 @@ fn send(to: SocketAddr, device: &Device, request: &[u8], document: &[u8]) -> (u1
 
 #[test]
 fn each_device_gets_what_it_asks_for_and_its_sheet_is_printed() {
+    if !ghostscript() {
+        return;
+    }
     let running = Running::start(Limits::default(), true);
     let to = running.address;
     let uri = format!("ipp://{to}/ipp/print/standard");
@@ -279,8 +358,26 @@ fn each_device_gets_what_it_asks_for_and_its_sheet_is_printed() {
         assert_eq!(kept.len(), number, "{name}");
         kept.sort_by_key(|entry| entry.metadata().unwrap().modified().unwrap());
         let found = inspect(&fs::read(kept[number - 1].path()).unwrap(), &Silent);
-        let dots: u64 = found.passes.iter().map(|pass| pass.plane.dots()).max().unwrap_or(0);
-        // An inch of black is 600 x 600 dots.
-        assert!((355_000..365_000).contains(&dots), "{name}: {dots} dots");
+        let paper = Paper::Custom { width: 2240, length: 3140 };
+        // Left, top, width and length of a field in dots of what can be printed, to two dots.
+        let field = |[x, y, side]: [f64; 3]| {
+            let dots = |inches: f64| (600.0 * inches) as usize;
+            [dots(x) - usize::from(LEFT), dots(y) - usize::from(paper.top()), dots(side), dots(side)]
+        };
+        let (black, red) = (field([1.0, 1.0, 1.0]), field([2.5, 3.0, 0.5]));
+        let mut inks: Vec<&str> = Vec::new();
+        for pass in &found.passes {
+            let bounds = found.inspection.passes[inks.len()].bounds.expect("dots");
+            let at = [bounds.x, bounds.y, bounds.width, bounds.height];
+            let is_at = |field: [usize; 4]| at.iter().zip(field).all(|(a, b)| a.abs_diff(b) <= 2);
+            match pass.ink {
+                Ink::Black => assert!(is_at(black), "{name}: {at:?}, not {black:?}"),
+                _ => assert!(is_at(red), "{name}, {}: {at:?}, not {red:?}", pass.ink.name()),
+            }
+            inks.push(pass.ink.name());
+        }
+        inks.sort_unstable();
+        let expected: &[&str] = if device.is_colour { &["black", "magenta", "yellow"] } else { &["black"] };
+        assert_eq!(inks, expected, "{name}");
     }
 }

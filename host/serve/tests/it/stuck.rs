@@ -177,7 +177,8 @@ fn a_full_disk_stops_nothing_for_ever() {
     running.until("printed", |running| running.server.data().jobs[&job].state == State::Completed);
     assert_eq!(fs::read_dir(kept.path().join("sheets")).unwrap().count(), 60);
     assert_eq!(words(&running), "");
-    // Cancelling makes room.
+    // What was printed makes room first, and then cancelling.
+    running.server.store.clear(job, false).unwrap();
     fill(document.len() as u64 + 400_000);
     let job = ipp::print(running.address, "standard", "sixty", &document).unwrap() as u32;
     running.until("full", |running| words(running).contains("spool-area-full"));
