@@ -19,14 +19,6 @@ impl World {
         if let Some(mut draw) = self.chance.happens(Kind::PaperOut) {
             self.printer.paper_out_until = self.now + draw.below(4_000) as u64 * MS;
         }
-        // A printer that is off only while the board restarts is one that nobody has seen off.
-        if self.board.is_some()
-            && let Some(mut draw) = self.chance.happens(Kind::SwitchOff)
-        {
-            self.harmed = true;
-            self.printer.off_until = self.now + (50 + draw.below(4_000) as u64) * MS;
-            self.printer.reset();
-        }
         if let Some(mut draw) = self.chance.happens(Kind::Age) {
             self.harmed = true;
             let (mut byte, bit) = (draw.below(SECTORS * 4096), draw.below(8) as u8);
@@ -64,6 +56,15 @@ impl World {
                 self.harmed |= how != Down::Watchdog;
                 return (Some(how), draw);
             }
+        }
+        // A printer that is off only while the board restarts is one that nobody has seen off; so is one that goes
+        // off in the very turn in which the board goes down, for that turn leaves no mark.
+        if self.board.is_some()
+            && let Some(mut draw) = self.chance.happens(Kind::SwitchOff)
+        {
+            self.harmed = true;
+            self.printer.off_until = self.now + (50 + draw.below(4_000) as u64) * MS;
+            self.printer.reset();
         }
         (None, Draw::new(self.seed ^ self.step))
     }
