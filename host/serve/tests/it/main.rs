@@ -8,6 +8,7 @@ mod devices;
 mod fitted;
 mod jobs;
 mod limits;
+mod network;
 mod rights;
 mod stuck;
 

@@ -57,8 +57,8 @@ impl World {
                 return (Some(how), draw);
             }
         }
-        // A printer that is off only while the board restarts is one that nobody has seen off; so is one that goes
-        // off in the very turn in which the board goes down, for that turn leaves no mark.
+        // A printer that is off only while the board restarts is one that nobody has seen off; so is one that
+        // goes off in the very turn in which the board goes down, for that turn leaves no mark.
         if self.board.is_some()
             && let Some(mut draw) = self.chance.happens(Kind::SwitchOff)
         {
