@@ -39,6 +39,10 @@ use press::pipeline::JobError;
 /// The largest document.
 pub const LARGEST: u64 = 1 << 30;
 
+/// A page that is enlarged has at most the area of so many sheets. Source: at four bytes a dot, nine of A4 are
+/// 1.1 GB.
+const MOST_SHEETS: f64 = 9.0;
+
 /// How pictures without a page begin, and how their files end.
 const PICTURES: [(&[u8], &str); 2] = [(b"\xff\xd8\xff", ".jpg"), (b"\x89PNG", ".png")];
 
@@ -50,7 +54,8 @@ pub enum FilterError {
     Choice(#[from] NoChoice),
     /// A kind that is not read.
     #[error(
-        "the document is neither PDF nor raster, JPEG or PNG; install the print system's filters to convert other files"
+        "the document is neither PDF nor raster, JPEG or PNG; install the print system's filters to \
+     convert other files"
     )]
     Kind,
     /// Nothing to print, as where no page was selected.
@@ -99,6 +104,19 @@ pub enum FilterError {
         page: usize,
         /// Why not.
         source: FitError,
+    },
+    /// A page that would be drawn far larger than its sheet.
+    #[error(
+        "page {page} would be {width:.0} x {length:.0} mm as it is to be printed, more than {MOST_SHEETS} \
+         sheets; make it smaller, or have it fitted to the sheet"
+    )]
+    Large {
+        /// Page, from 1.
+        page: usize,
+        /// Its width in mm as it would be drawn.
+        width: f64,
+        /// Its length.
+        length: f64,
     },
     /// Nothing to print, though something is drawn.
     #[error(

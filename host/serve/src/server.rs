@@ -272,9 +272,9 @@ impl Server {
         identity(&self.data(), of)
     }
 
-    /// The sheets of a job that are being drawn have come so far; `None` when they are all drawn.
-    pub(crate) fn draws(&self, id: u32, sheets: Option<usize>) {
-        self.data().drawing = sheets.map(|sheets| (id, sheets));
+    /// The job that is being drawn has so many sheets now; `None` when nothing is drawn any more.
+    pub(crate) fn draws(&self, drawing: Option<(u32, usize)>) {
+        self.data().drawing = drawing;
     }
 
     /// What the delivery knows of jobs.

@@ -250,7 +250,7 @@ struct Told<'a>(&'a Server);
 
 impl Drop for Told<'_> {
     fn drop(&mut self) {
-        self.0.draws(0, None);
+        self.0.draws(None);
     }
 }
 
@@ -341,7 +341,7 @@ impl Write for SheetFiles<'_> {
             return Err(io::Error::other("nobody wants it any more"));
         }
         self.count += 1;
-        self.voice.server.draws(self.voice.id, Some(self.count));
+        self.voice.server.draws(Some((self.voice.id, self.count)));
         if self.count > self.making.count() {
             let path = self.making.path(self.count);
             durable::write(&path, sheet, Access::Private)?;

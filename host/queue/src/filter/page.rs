@@ -7,7 +7,7 @@ use inks::Library;
 use protocol::ink::{Ink, Kind};
 use protocol::paper::Paper;
 
-use super::{FilterError, Filtered, Lies, io_error};
+use super::{FilterError, Filtered, Lies, MOST_SHEETS, io_error};
 use crate::ppd;
 use art::pdf::Part;
 use art::{Artwork, Window};
@@ -16,6 +16,7 @@ use make::options::{Choices, Place, is_chosen};
 use make::{Layers, layers};
 use observe::{Diagnosis, Observer};
 use press::layout::fit::{Edge, Fit, Scaling, Wish, fit};
+use press::layout::paper::sheet_mm;
 use press::layout::{Cut, Layout, LayoutError, Mm, Point, Position};
 use press::pipeline::JobError;
 use press::separate::CARTRIDGES;
@@ -143,6 +144,12 @@ impl<'a> Press<'a> {
         };
         let fit = fit(size, Edge::Margin, paper, &self.placed(wish))
             .map_err(|source| FilterError::Fit { page, source })?;
+        // Whoever asks for a width, or for a sheet that is covered, may not know how long the page gets.
+        let (width, length) = (fit.scale * size.0, fit.scale * size.1);
+        let sheet = sheet_mm(paper);
+        if fit.scale > 1.0 && width * length > MOST_SHEETS * sheet.0 * sheet.1 {
+            return Err(FilterError::Large { page, width, length });
+        }
         Ok(Laid { paper, fit, place: Place::Page })
     }
 

@@ -80,15 +80,7 @@ fn pdf(is_turned: bool) -> Vec<u8> {
         format!("<</Type/Page/Parent 2 0 R/MediaBox[{box_}]/Contents 4 0 R>>"),
         format!("<</Length {}>>\nstream\n{drawing}\nendstream", drawing.len()),
     ];
-    let (mut text, mut places) = (String::from("%PDF-1.4\n"), String::new());
-    for (number, object) in (1..).zip(&objects) {
-        places += &format!("{:010} 00000 n \n", text.len());
-        text += &format!("{number} 0 obj\n{object}\nendobj\n");
-    }
-    let at = text.len();
-    text += &format!("xref\n0 5\n0000000000 65535 f \n{places}");
-    text += &format!("trailer\n<</Size 5/Root 1 0 R>>\nstartxref\n{at}\n%%EOF\n");
-    text.into_bytes()
+    super::fitted::pdf(&objects)
 }
 
 /// The same as Apple raster: rows are packed alike, and the header is shorter.

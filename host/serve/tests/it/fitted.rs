@@ -29,14 +29,19 @@ fn page(media: (f64, f64), (left, below): (f64, f64), seen: (f64, f64), more: &s
         ),
         format!("<</Length {}>>\nstream\n{drawing}\nendstream", drawing.len()),
     ];
+    pdf(&objects)
+}
+
+/// A PDF of these objects, numbered from 1, of which the first is its catalog.
+pub(super) fn pdf(objects: &[String]) -> Vec<u8> {
     let (mut text, mut places) = (String::from("%PDF-1.4\n"), String::new());
-    for (number, object) in (1..).zip(&objects) {
+    for (number, object) in (1..).zip(objects) {
         places += &format!("{:010} 00000 n \n", text.len());
         text += &format!("{number} 0 obj\n{object}\nendobj\n");
     }
-    let at = text.len();
-    text += &format!("xref\n0 5\n0000000000 65535 f \n{places}");
-    text += &format!("trailer\n<</Size 5/Root 1 0 R>>\nstartxref\n{at}\n%%EOF\n");
+    let (at, all) = (text.len(), objects.len() + 1);
+    text += &format!("xref\n0 {all}\n0000000000 65535 f \n{places}");
+    text += &format!("trailer\n<</Size {all}/Root 1 0 R>>\nstartxref\n{at}\n%%EOF\n");
     text.into_bytes()
 }
 
@@ -95,6 +100,10 @@ fn ordinary_pages_lie_on_the_loaded_sheet_as_people_expect() {
         );
         assert!(said.ends_with(words), "{name}: {said}");
     }
+    // Nobody has a thin page drawn that covers the sheet and is 6 m long.
+    let fill: [Attribute<'_>; 1] = [(0x44, "print-scaling", b"fill")];
+    let job = running.print(&fill, &whole((20.0, 600.0), ""), State::Aborted);
+    assert!(job.message.contains("mm as it is to be printed, more than 9 sheets"), "{}", job.message);
     // Turned the other way.
     let asked: [Attribute<'_>; 1] = [(0x23, "orientation-requested", &[0, 0, 0, 5])];
     let (found, _) = printed(&running, &asked, &whole((297.0, 210.0), ""));

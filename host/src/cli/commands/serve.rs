@@ -371,20 +371,19 @@ mod with_server {
         systemctl(&["restart", &unit])
     }
 
-    /// Whether a preset has what it needs where the service reads: what it names by the place of a file stays
-    /// behind.
+    /// Whether a preset has what it needs where the service reads: a library that is named by its folder
+    /// stays behind.
     fn travels(name: &str) -> Result<()> {
         let Some((_, words)) = preset::all()?.into_iter().find(|(known, _)| known == name) else {
             return Ok(());
         };
-        for word in words {
-            if let Some((option, value)) = word.split_once('=')
-                && Path::new(value).exists()
-                && !crate::libraries::is_built_in(Path::new(value))
+        for library in words.iter().filter_map(|word| word.strip_prefix("--library=")) {
+            if crate::libraries::added(library).is_none()
+                && !crate::libraries::is_built_in(Path::new(library))
             {
                 bail!(
-                    "the preset `{name}` names {value} ({option}), which the service cannot read; an ink library that was added with \
-                     `foilpress inks add` travels along under its name"
+                    "the preset `{name}` names the ink library {library}, which the service cannot read; add it with \
+                     `foilpress inks add`, and save the preset with the name that it has then"
                 );
             }
         }
