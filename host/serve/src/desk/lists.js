@@ -29,7 +29,7 @@ function slots(found) {
   }));
 }
 
-function job(job) {
+function lineOf(job) {
   const line = element("li");
   const count = job.held ? "" : job.sheets ? ` (${job.done} of ${job.sheets})` : job.done ? ` (${job.done} so far)` : "";
   line.append(`${job.id} `, element("bdi", { textContent: job.name }), `: ${job.state}${count}. ${job.message} `);
@@ -55,7 +55,7 @@ function job(job) {
 /** Jobs that are over, each with its picture once they are in sight. */
 function before(jobs) {
   return jobs.map((one) => {
-    const line = job(one);
+    const line = lineOf(one);
     if (one.again && at("history").open) {
       const image = element("img", { alt: "" });
       line.prepend(image);
@@ -109,7 +109,7 @@ export function show(about) {
   loaded(about);
   const [over, open] = [about.jobs.filter((one) => one.over), about.jobs.filter((one) => !one.over)];
   at("jobs-part").hidden = about.jobs.length === 0;
-  set(at("jobs"), open, () => open.map(job));
+  set(at("jobs"), open, () => open.map(lineOf));
   at("history").hidden = over.length === 0;
   set(at("over"), [over, at("history").open], () => before(over));
   // What is printed or cancelled elsewhere is closed here, too.

@@ -90,11 +90,13 @@ export function close() {
 
 /** Changes what the job asks for. */
 export function change(parameters) {
+  if (open === 0) return;
   Object.assign(wanted, parameters);
-  if (busy || open === 0) return;
+  if (busy) return;
   busy = true;
   attempt(async () => {
-    while (open !== 0 && Object.keys(wanted).length > 0) {
+    // Closing empties what is wanted.
+    while (Object.keys(wanted).length > 0) {
       const now = wanted;
       wanted = {};
       sheet.draws();
