@@ -15,7 +15,9 @@ fn a_page_that_a_device_sends_crosses_the_port() {
     let serve = |to: &str| {
         let mut command = bench.foilpress(&["serve", "--listen", "127.0.0.1:0", "--to", to]);
         command.env("FOILPRESS_CONFIG", bench.folder.path().join("config"));
-        Serving::of(command)
+        let serving = Serving::of(command);
+        serving.load("jpn_hagaki_100x148mm");
+        serving
     };
     let mut preset = bench.foilpress(&["preset", "save", "card", "--paper", "postcard"]);
     let saved = preset.env("FOILPRESS_CONFIG", bench.folder.path().join("config")).output().unwrap();

@@ -60,6 +60,13 @@ impl Serving {
         assert_eq!(ipp::ask(self.address, &released).unwrap().0, 0);
     }
 
+    /// Says at the desk which sheet is in the printer.
+    pub(crate) fn load(&self, size: &str) {
+        let to = self.address;
+        let load = format!("POST /desk/load?size={size}&kind=auto HTTP/1.1\r\nHost: {to}\r\n");
+        assert_eq!(ipp::http(to, &load, b"").unwrap().0, 200);
+    }
+
     pub(crate) fn wait_for(&self, job: i32) -> i32 {
         let start = Instant::now();
         loop {
@@ -212,10 +219,8 @@ fn three_ways_to_print_a_document_make_the_same_job() {
         assert!(filter.status.success(), "{}", String::from_utf8_lossy(&filter.stderr));
 
         let serving = Serving::start(&bench, &format!("file:{name}.sheets"));
-        let to = serving.address;
-        let load = "POST /desk/load?size=custom_x_101.6x152.4mm&kind=auto";
-        assert_eq!(ipp::http(to, &format!("{load} HTTP/1.1\r\nHost: {to}\r\n"), b"").unwrap().0, 200);
-        let job = ipp::print(to, "placed", name, &fs::read(bench.path(name)).unwrap()).unwrap();
+        serving.load("custom_x_101.6x152.4mm");
+        let job = ipp::print(serving.address, "placed", name, &fs::read(bench.path(name)).unwrap()).unwrap();
         assert_eq!(serving.wait_for(job), 9);
         serving.kill();
         let kept: Vec<_> = fs::read_dir(bench.path(&format!("{name}.sheets"))).unwrap().collect();
