@@ -5,21 +5,27 @@
 //! else goes to it, whoever comes next and however long the supply was away.
 //! Method: a poll does one thing at most: it answers a question, writes a page, or reads one. Storing goes on only while
 //! nothing is printed, because the flash cannot be read while it is written, and the processor stands still for that long.
-//! Printing writes to the flash twice: before the first byte, and when the job has ended. So the printer's state after a loss of the
-//! supply is known from the flash, and after any other reset from memory, to the byte ([`crate::checkpoint`]); then the
-//! engine gets the data once more and leaves out what has crossed.
+//! Printing, whatever the job and its way, writes to the flash twice: before the first byte, and when the job has ended. So the printer's
+//! state after a loss of the supply is known from the [diary](crate::store), and after any other reset from memory, to the byte
+//! ([`crate::checkpoint`]); then the engine gets the data of a stored job once more and leaves out what has crossed.
+//! A store whose host is silent is dropped after [`SILENCE_US`], since it cannot be resumed and keeps all others waiting.
 //! Cost: a poll that writes takes as long as the flash does; all others stay well below a millisecond.
-//! That a plain job is open is written, too, since neither a host nor the store knows of it.
 //! Limits: if the supply goes between the last byte of a job and the note that it has ended, some milliseconds, the sheet counts as lost.
 
 use crate::engine::{Engine, Request};
-use crate::store::{Flash, Next, Note, PAGE_DATA, Reading, Standing, Store, Stored, Worn};
+use crate::standing::Standing;
+use crate::store::{End, Flash, Next, PAGE_DATA, Reading, Record, Store, Stored, Worn};
 use protocol::link::message::{ALONE, JobState, Refusal, StoredJob};
 
-/// The store, and the job that is printed from it.
+/// For how long the host of a job that is being stored may say nothing of it. Source: `docs/decisions/print-alone.md`.
+pub const SILENCE_US: u64 = 30_000_000;
+
+/// The store, its diary, and the job that is printed from it.
 pub struct Alone<F> {
     store: Store<F>,
     run: Option<Run>,
+    /// How often the host had spoken of the job that is being stored when it last did, and when that was.
+    heard: (u32, u64),
 }
 
 /// A stored job that is being printed.
@@ -34,23 +40,22 @@ impl<F: Flash> Alone<F> {
     /// from a checkpoint, which then knows better. To be called before anything is sent.
     pub fn open(flash: F, engine: &mut Engine<'_>, remembers: bool) -> Self {
         let store = Store::open(flash);
-        let mut alone = Alone { store, run: None };
-        let note = alone.store.note();
+        let mut alone = Alone { store, run: None, heard: (0, 0) };
         engine.set_stored(alone.store.jobs().len());
         for stored in alone.store.jobs() {
             engine.was_stored(stored.job);
         }
-        if note.job != 0 && engine.open_job() == Some(note.job) {
-            if let Some(stored) = alone.find(|stored| stored.id() == note.stored) {
-                engine.resume_from_store(stored.kind, stored.length);
-                alone.run = Some(alone.begin(note.job, stored));
-            }
-        } else if !remembers {
-            match note.standing {
-                Standing::Printing => engine.lost_from_store(note.job),
-                Standing::ResetOwed => engine.owe_reset(),
-                Standing::Clear => {}
-            }
+        if alone.store.keeps_diary() {
+            engine.keep_diary();
+        }
+        let Some(Record { job, stored, end }) = alone.store.noted() else { return alone };
+        if !remembers {
+            engine.wake(end.is_some(), if end == Some(End::Legal) { 0 } else { job });
+        } else if engine.open_job() == Some(job)
+            && let Some(stored) = alone.find(|found| found.id() == stored)
+        {
+            engine.resume_from_store(stored.kind, stored.length);
+            alone.run = Some(alone.begin(job, stored));
         }
         alone
     }
@@ -61,30 +66,43 @@ impl<F: Flash> Alone<F> {
     }
 
     /// Does what is due, one thing at most; returns whether there may be more at once.
-    pub fn poll(&mut self, engine: &mut Engine<'_>) -> bool {
+    pub fn poll(&mut self, engine: &mut Engine<'_>, now_us: u64) -> bool {
         if self.run.as_ref().is_some_and(|run| !engine.prints_from_store(run.job)) {
             self.run = None;
         }
         self.note(engine);
         if let Some(request) = engine.request() {
-            self.serve(request, engine);
+            self.serve(request, engine, now_us);
             return true;
         }
-        if self.run.is_some() { self.feed(engine) } else { self.keep(engine) }
+        if self.run.is_some() { self.feed(engine) } else { self.keep(engine, now_us) }
     }
 
-    /// Writes where the printer stands, if that has changed.
-    fn note(&mut self, engine: &Engine<'_>) {
-        let Note { job, stored, .. } = self.store.note();
-        let note = match &self.run {
-            Some(run) => Note { standing: Standing::Printing, job: run.job, stored: run.stored.id() },
-            None if engine.leaves_a_reset() => Note { standing: Standing::ResetOwed, job, stored },
-            None => Note { standing: Standing::Clear, job, stored },
-        };
-        self.store.write_note(note);
+    /// Notes which sheet the printer is in, or is about to be in, which may begin then.
+    fn note(&mut self, engine: &mut Engine<'_>) {
+        let begins = engine.waits_to_begin();
+        match (&self.run, engine.standing()) {
+            (Some(run), _) => self.store.note_begin(run.job, run.stored.id()),
+            (None, Standing::InSheet(job)) => self.store.note_begin(job, 0),
+            (None, Standing::AtRest) => match begins {
+                Some(job) => self.store.note_begin(job, 0),
+                None => {
+                    let lost = self.store.noted().is_some_and(|last| engine.has_lost(last.job));
+                    self.store.note_end(if lost { End::Reset } else { End::Legal });
+                }
+            },
+            // A record without an end says so already.
+            (None, Standing::Unknown { job, .. }) if self.store.noted().is_some_and(|last| last.end.is_some()) => {
+                self.store.note_begin(job, 0);
+            }
+            (None, Standing::Unknown { .. }) => {}
+        }
+        if let Some(job) = begins {
+            engine.begin_sheet(job);
+        }
     }
 
-    fn serve(&mut self, request: Request, engine: &mut Engine<'_>) {
+    fn serve(&mut self, request: Request, engine: &mut Engine<'_>, now_us: u64) {
         match request {
             Request::Store { job, kind, length, name } => {
                 if engine.open_job().is_some() {
@@ -94,6 +112,7 @@ impl<F: Flash> Alone<F> {
                 } else if !engine.open_for_store(job, kind, length) {
                     engine.refuse_stored(Refusal::Empty, job);
                 }
+                self.heard = (engine.words_of_store(), now_us);
             }
             Request::List { request, index } => self.tell(request, Some(index), engine),
             Request::Print { job, stored } => match self.find(|found| found.job == stored) {
@@ -105,9 +124,8 @@ impl<F: Flash> Alone<F> {
                     self.print(ALONE, last, engine);
                 }
             }
-            Request::Delete { stored, .. }
-                if self.run.as_ref().is_some_and(|run| run.stored.job == stored) =>
-            {
+            // Nothing is written while bytes flow.
+            Request::Delete { stored, .. } if engine.open_job().is_some() => {
                 engine.refuse_stored(Refusal::JobOpen, stored);
             }
             Request::Delete { request, stored } => {
@@ -171,19 +189,20 @@ impl<F: Flash> Alone<F> {
         true
     }
 
-    /// Writes the next page of the job that is stored.
-    fn keep(&mut self, engine: &mut Engine<'_>) -> bool {
-        match engine.storing() {
-            None => {
-                self.store.forget();
-                return false;
-            }
-            Some((_, true)) => {
-                self.store.forget();
-                engine.stored(JobState::Cancelled);
-                return true;
-            }
-            Some((_, false)) => {}
+    /// Writes the next page of the job that is stored; while there is none, what makes room for the diary.
+    fn keep(&mut self, engine: &mut Engine<'_>, now_us: u64) -> bool {
+        let Some(cancelled) = engine.storing() else {
+            self.store.forget();
+            let at_rest = engine.is_idle() && engine.standing() == Standing::AtRest;
+            return at_rest && self.store.make_room();
+        };
+        if self.heard.0 != engine.words_of_store() {
+            self.heard = (engine.words_of_store(), now_us);
+        }
+        if cancelled || now_us.saturating_sub(self.heard.1) >= SILENCE_US {
+            self.store.forget();
+            engine.stored(JobState::Cancelled);
+            return true;
         }
         let mut page = [0; PAGE_DATA];
         let page = &mut page[..self.store.wants()];

@@ -19,6 +19,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::engine::Checkpoint;
+use crate::standing::Standing;
 
 /// Marks in the ring, as a power of two: more than two buffers of any sender.
 pub const MARKS_BITS: u8 = 12;
@@ -32,7 +33,7 @@ pub const PAST_SLOT: usize = 288;
 const HEAD: usize = 12;
 
 /// What of a checkpoint changes with every byte.
-type Position = (Progress, Option<u32>, bool, bool, bool, bool);
+type Position = (Progress, Option<u32>, Standing, bool, bool);
 
 /// Memory that outlives a reset. Writes happen in the order in which they are asked for.
 pub trait Memory {
@@ -82,9 +83,9 @@ impl<M: Memory> CheckpointStore<M> {
         let crossed = (0..MARKS).take_while(|at| memory.is_marked((place + at) % MARKS)).count();
         #[expect(clippy::cast_possible_truncation, reason = "at most MARKS")]
         let count = crossed as u32;
-        let (mut progress, ends_at, needs_reset, at_rest, one_way, flowing): Position = position;
+        let (mut progress, ends_at, standing, one_way, flowing): Position = position;
         progress.printed = progress.printed.wrapping_add(count);
-        let checkpoint = Checkpoint { progress, ends_at, needs_reset, at_rest, one_way, flowing, past };
+        let checkpoint = Checkpoint { progress, ends_at, standing, one_way, flowing, past };
         let mut checkpoints = CheckpointStore { memory, number, place, last: None, past, past_number };
         checkpoints.store(checkpoint, place + crossed);
         // What a reset left between a slot and the clearing of its marks would be counted a turn of the ring later.
@@ -113,8 +114,8 @@ impl<M: Memory> CheckpointStore<M> {
             }
         }
         let number = self.number.wrapping_add(1);
-        let Checkpoint { progress, ends_at, needs_reset, at_rest, one_way, flowing, .. } = checkpoint;
-        let position: Position = (progress, ends_at, needs_reset, at_rest, one_way, flowing);
+        let Checkpoint { progress, ends_at, standing, one_way, flowing, .. } = checkpoint;
+        let position: Position = (progress, ends_at, standing, one_way, flowing);
         let Some(slot) = write(number, place, &position) else { return };
         self.number = number;
         self.memory.write((number % 2) as usize, slot);
@@ -248,8 +249,11 @@ mod tests {
         Checkpoint {
             progress,
             ends_at: Some(printed),
-            needs_reset: printed.is_multiple_of(2),
-            at_rest: printed.is_multiple_of(3),
+            standing: match printed % 3 {
+                0 => Standing::AtRest,
+                1 => Standing::InSheet(printed),
+                _ => Standing::Unknown { job: printed, due: printed.is_multiple_of(2) },
+            },
             one_way: printed.is_multiple_of(5),
             flowing: printed.is_multiple_of(7),
             past: [PastJob::NONE; PAST],
@@ -257,8 +261,8 @@ mod tests {
     }
 
     fn position(checkpoint: Checkpoint) -> Position {
-        let Checkpoint { progress, ends_at, needs_reset, at_rest, one_way, flowing, .. } = checkpoint;
-        (progress, ends_at, needs_reset, at_rest, one_way, flowing)
+        let Checkpoint { progress, ends_at, standing, one_way, flowing, .. } = checkpoint;
+        (progress, ends_at, standing, one_way, flowing)
     }
 
     fn held() -> Held {
@@ -368,12 +372,13 @@ mod tests {
             pass: u8::MAX,
             row: u16::MAX,
         };
-        let position: Position = (progress, Some(all), true, true, true, true);
+        let standing = Standing::Unknown { job: all, due: true };
+        let position: Position = (progress, Some(all), standing, true, true);
         assert!(write::<SLOT>(all, MARKS - 1, &position).is_some());
         let state = JobState::Broken(Defect { at: all, what: DefectKind::Truncated });
         let past = [PastJob { job: all, state, printed: all }; PAST];
         assert!(write::<PAST_SLOT>(all, 0, &past).is_some());
-        let position: Position = (Progress { state, ..progress }, Some(all), true, true, true, true);
+        let position: Position = (Progress { state, ..progress }, Some(all), standing, true, true);
         assert!(write::<SLOT>(all, MARKS - 1, &position).is_some());
     }
 

@@ -11,6 +11,7 @@
 //! | [`store`] | how jobs lie in the flash, whatever the supply does |
 //! | [`alone`] | what is stored and printed from the store, and what of it is remembered |
 //! | [`button`] | what a press of the button means |
+//! | [`standing`] | where the printer stands, and so what may go to it |
 //! | [`checkpoint`] | how a reset of the board leaves where a job stands |
 //! | [`links`] | which of two ways to the host is answered |
 //! | [`log`] | which piece of the log answers a question |
@@ -42,6 +43,7 @@ mod ring;
 #[cfg(any(test, feature = "simulation"))]
 #[allow(clippy::cast_possible_truncation, reason = "the simulation counts bytes of tests")]
 pub mod simulation;
+pub mod standing;
 pub mod store;
 mod streams;
 pub mod turn;

@@ -19,6 +19,8 @@ pub struct Turn {
     pub more: bool,
     /// The port had nothing to send and has something now.
     pub wake_port: bool,
+    /// A job waits to begin, which has to be noted first.
+    pub wake_store: bool,
 }
 
 /// Lets the engine work for a turn, by a clock in µs.
@@ -29,5 +31,6 @@ pub fn work(engine: &mut Engine<'_>, now_us: impl Fn() -> u64) -> Turn {
     while more && now_us() < end_us {
         more = engine.work();
     }
-    Turn { more, wake_port: empty && !engine.output().is_empty() }
+    let wake_store = engine.waits_to_begin().is_some();
+    Turn { more, wake_port: empty && !engine.output().is_empty(), wake_store }
 }

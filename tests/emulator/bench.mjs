@@ -56,6 +56,7 @@ export class Bench {
   constructor(settings) {
     this.settings = settings;
     this.board = new Board(new Uint8Array(readFileSync(image)));
+    if (!settings?.unaware) this.board.rest();
     this.printer = new Printer(this.board, settings);
     this.host = new Host(this.board);
     this.frames = new Frames();

@@ -33,6 +33,7 @@ if (!folder) {
 }
 
 const board = new Board(new Uint8Array(readFileSync(image)));
+board.rest();
 const host = new Host(board);
 let woken = () => {};
 const wake = () => woken();

@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { Bench, RAW, job, same, skip } from './bench.mjs';
+import { Bench, MS, RAW, job, random, same, skip } from './bench.mjs';
 
 /// A SETUP packet crosses.
 async function setup({ host, board }, type, request, value, index, length) {
@@ -65,6 +65,47 @@ for (const [what, begin] of Object.entries(KINDS)) {
     assert.equal(bench.board.watchdogBites, 0, 'without a restart');
   });
 }
+
+/// USB 2.0, 9.4.5: the request puts the toggle to DATA0, halted or not.
+test('behind CLEAR_FEATURE(ENDPOINT_HALT), sent at any count of packets, nothing is dropped', { skip }, async () => {
+  const next = random(9);
+  const bytes = job('small.rgl');
+  const bench = await connected();
+  const plain = bench.device.interfaces.find((one) => one.class === 7);
+  for (const count of [1, 2, 3, 6, 0, ...Array.from({ length: 12 }, () => next(20))]) {
+    bench.printer.taken = [];
+    const cut = Math.min(count * 64, bytes.length);
+    await bench.until(bench.host.write(plain.out, bytes.subarray(0, cut)), 10_000);
+    if (next(2)) await bench.pass(next(4));
+    assert.ok(await bench.until(bench.host.clearHalt(plain.out)));
+    await bench.until(bench.host.write(plain.out, bytes.subarray(cut)), 20_000);
+    await bench.board.run(() => bench.printer.taken.length >= bytes.length, 2000 * MS);
+    same(bench.printer.taken, bytes);
+    assert.equal(bench.host.dropped, 0, `behind ${count} packets`);
+  }
+});
+
+test('CLEAR_FEATURE(ENDPOINT_HALT) and SET_INTERFACE at any instant of a job of the link cost nothing', { skip }, async () => {
+  const next = random(10);
+  const bytes = job('small.rgl');
+  for (let round = 0; round < 3; round++) {
+    const bench = await connected();
+    const requests = [
+      () => bench.host.clearHalt(bench.end.out),
+      () => bench.host.clearHalt(0x80 | bench.end.in),
+      () => bench.host.transfer([0x01, 11, 0, bench.end.number], new Uint8Array(0)),
+    ];
+    for (let from = 0; from < bytes.length - 400; ) {
+      // A host has nothing under way on an endpoint whose halt it ends.
+      const end = from + 1 + next(600);
+      await bench.print(3, RAW, bytes, { piece: 1 + next(300), from, until: (sent) => { from = sent; return sent >= end; } });
+      assert.ok(await bench.until(requests[next(requests.length)]()));
+    }
+    assert.equal((await bench.print(3, RAW, bytes, { from: bench.progress.accepted })).state, 'done');
+    same(bench.printer.taken, bytes);
+    assert.equal(bench.host.dropped, 0);
+  }
+});
 
 test('a request to the host that wants no bytes is answered, and so is the next one', { skip }, async () => {
   const bench = await connected();

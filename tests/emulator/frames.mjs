@@ -147,6 +147,8 @@ export function parse(message) {
         : null;
       return { kind: 'stored', request, count, room, total, job };
     }
+    case 10:
+      return { kind: 'standing', standing: ['unknown', 'at rest', 'in a sheet'][byte()], job: number() };
     default:
       return { kind: 'other' };
   }

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { Bench, MS, RAW, job, skip } from './bench.mjs';
-import { begin } from './frames.mjs';
+import { begin, initialise } from './frames.mjs';
 import { waveform } from './printer.mjs';
 
 const LOCAL = 0xffffffff;
@@ -64,6 +64,9 @@ test('it answers for the printer: by a description that fits until that has been
   assert.match(text(await bench.deviceId()), /Foilpress/);
   bench.printer.id = id('MFG:ALPS;MDL:MD-5000;');
   bench.printer.set('power', 1);
+  await bench.pass(700);
+  assert.match(text(await bench.deviceId()), /Foilpress/, 'it may be in the middle of a sheet');
+  await bench.say(initialise(7));
   await bench.pass(700);
   assert.match(text(await bench.deviceId()), /MDL:MD-5000;$/);
   assert.deepEqual(bench.printer.taken, []);

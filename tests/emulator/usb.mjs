@@ -3,9 +3,13 @@
 // rp2040js takes a buffer away the moment the firmware arms it. Firmware that watches the AVAILABLE bit (embassy
 // does) then reads 64 bytes of rubbish. Here the controller's two entry points are replaced: a buffer stays available
 // until its packet has crossed the bus, which takes as long as it takes at full speed, one packet at a time.
+//
+// The host keeps the toggle of every endpoint, as USB 2.0 has it (8.6): a packet that is not the one that comes next is taken for a
+// repetition, acknowledged and dropped, by whichever side hears it.
 
 const AVAILABLE = 1 << 10;
 const STALL = 1 << 11;
+const DATA1 = 1 << 13;
 const FULL = 1 << 15;
 const LENGTH = 0x3ff;
 
@@ -27,6 +31,8 @@ export class Host {
     this.reading = new Map(); // who wants packets of an IN endpoint
     this.busFreeAt = 0;
     this.packets = 0;
+    this.toggles = new Map(); // of the packet that comes next: 0 or DATA1
+    this.dropped = 0; // bytes of packets that were taken for repetitions
     this.resets = 0;
     this.attached = new Promise((resolve) => { this.onReset = resolve; });
     this.usb.DPRAMUpdated = (offset, value) => this.written(offset, value);
@@ -70,23 +76,32 @@ export class Host {
         packet?.lost(new Error('the buffer was taken back'));
         return;
       }
+      // Nobody asks for it any more: it stays where it is.
+      if (!out && !this.reading.get(id)) {
+        this.armed.add(id);
+        return;
+      }
       const at = this.usb.getEndpointBufferOffset(endpoint, out);
       this.packets += 1;
-      if (out) {
+      const toggle = this.toggles.get(id) ?? 0;
+      const repeats = endpoint !== 0 && (now & DATA1) !== toggle;
+      if (repeats) this.dropped += length;
+      // Whoever sends goes on; whoever hears a repetition waits for the next one.
+      if (out || !repeats) this.toggles.set(id, toggle ^ DATA1);
+      if (out && repeats) {
+        packet.sent();
+        this.armed.add(id);
+        this.go(endpoint, out);
+      } else if (out) {
         this.memory.set(packet.bytes, at);
         this.view.setUint32(register, (now & ~(AVAILABLE | LENGTH)) | FULL | length, true);
         this.usb.indicateBufferReady(endpoint, true);
         packet.sent();
       } else {
-        // Nobody asks for it any more: it stays where it is.
-        if (!this.reading.get(id)) {
-          this.armed.add(id);
-          return;
-        }
         const bytes = this.memory.slice(at, at + length);
         this.view.setUint32(register, now & ~(AVAILABLE | FULL), true);
         this.usb.indicateBufferReady(endpoint, false);
-        this.reading.get(id)(bytes);
+        if (!repeats) this.reading.get(id)(bytes);
       }
     });
   }
@@ -107,6 +122,11 @@ export class Host {
     return sent;
   }
 
+  /// Whether packets of an OUT endpoint wait or cross.
+  busy(endpoint) {
+    return this.crossing.size > 0 || (this.queues.get(key(endpoint, true))?.length ?? 0) > 0;
+  }
+
   /// Takes back the packets of an OUT endpoint that have not begun to cross.
   takeBack(endpoint) {
     for (const packet of this.queues.get(key(endpoint, true))?.splice(0) ?? []) packet.lost(new Error('taken back'));
@@ -114,6 +134,7 @@ export class Host {
 
   /// Pulls the cable and plugs it in again: nothing of what was under way arrives, and the device is to be enumerated.
   replug() {
+    this.toggles.clear();
     this.attached = new Promise((resolve) => { this.onReset = resolve; });
     const lost = [...this.crossing, ...[...this.queues.values()].flat()];
     this.queues.clear();
@@ -167,9 +188,27 @@ export class Host {
     };
     const result = await Promise.race([whole(), refused]);
     this.stalled = null;
+    if (result) this.beginAnew(requestType, request, index);
     this.takeBack(0);
     this.reading.delete(key(0, false));
     return result;
+  }
+
+  /// Requests behind which endpoints go on with DATA0: SET_CONFIGURATION, SET_INTERFACE, CLEAR_FEATURE(ENDPOINT_HALT).
+  beginAnew(requestType, request, index) {
+    if (requestType === 0x00 && request === 9) this.toggles.clear();
+    if (requestType === 0x02 && request === 1) this.toggles.delete(key(index & 15, (index & 0x80) === 0));
+    if (requestType === 0x01 && request === 11) {
+      const { in: to, out: from } = this.interfaces.find(({ number }) => number === index) ?? {};
+      for (const id of [key(to, false), key(from, true)]) this.toggles.delete(id);
+    }
+  }
+
+  interfaces = [];
+
+  /// Ends the halt of an endpoint, as hosts do with every transfer they give up.
+  clearHalt(address) {
+    return this.transfer([0x02, 1, 0, address], new Uint8Array(0));
   }
 
   /// The next packet of an endpoint.
@@ -190,7 +229,8 @@ export class Host {
     };
     const names = [await string(device[14]), await string(device[15]), await string(device[16])];
     await this.transfer([0x00, 9, configuration[5], 0], new Uint8Array(0));
-    return { device, configuration, names, interfaces: interfaces(configuration) };
+    this.interfaces = interfaces(configuration);
+    return { device, configuration, names, interfaces: this.interfaces };
   }
 
   /// What a program does that opens the serial port, or closes it.

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use bridge::alone::Alone;
 use bridge::button::Press;
 use bridge::engine::{Checkpoint, Engine, Identity, Memory, Outcome, Task};
-use bridge::store::{Flash, SECTOR};
+use bridge::store::{End, Flash, SECTOR, Store};
 use device::connection::transport::{Socket, Transport};
 use press::simulate::{Carousel, Cartridge, Lever, Printer, STATUS_LENGTH, Trouble};
 use protocol::ink::Ink;
@@ -100,7 +100,7 @@ impl Port {
             forget: false.into(),
             restart: false.into(),
             press: false.into(),
-            flash: Mutex::new(vec![0xff; 480 * SECTOR as usize]),
+            flash: Mutex::new(flash()),
             cartridges: cartridges.iter().copied().map(Cartridge::from).collect(),
             band: 40_000,
             stop: false.into(),
@@ -122,6 +122,11 @@ impl Port {
         self.flash.lock().expect("no test panicked with it").iter().filter(|&&byte| byte != 0xff).count()
     }
 
+    /// Notes that the supply went in the middle of this job, for a bridge that forgets then.
+    pub fn tear(&self, job: u32) {
+        Store::open(Area(&self.flash)).note_begin(job, 0);
+    }
+
     fn status(&self) -> [u8; STATUS_LENGTH] {
         let carousel = Carousel::new(&self.cartridges).expect("at most seven cartridges");
         let mut printer = Printer::new(carousel, Lever::Auto);
@@ -136,6 +141,16 @@ impl Port {
         }
         status
     }
+}
+
+/// A flash whose diary says that the printer stands between two jobs.
+fn flash() -> Vec<u8> {
+    let flash = Mutex::new(vec![0xff; 480 * SECTOR as usize]);
+    let mut store = Store::open(Area(&flash));
+    store.note_begin(1, 0);
+    store.note_end(End::Legal);
+    drop(store);
+    flash.into_inner().expect("nobody else has it")
 }
 
 /// The area of the flash, in memory.
@@ -275,6 +290,7 @@ fn serve(
     let (mut reader, mut buffer) = (Reader::new(), [0; 4096]);
     let mut link: Option<Box<dyn Transport>> = None;
     let mut alone = Alone::open(Area(&port.flash), &mut engine, remembers);
+    let started = Instant::now();
     while !is(&port.stop) && !port.forget.swap(false, Ordering::Relaxed) {
         if port.restart.swap(false, Ordering::Relaxed) {
             return Some(engine.checkpoint());
@@ -327,7 +343,7 @@ fn serve(
             engine.press(Press::Short);
         }
         for _ in 0..50 {
-            alone.poll(&mut engine);
+            alone.poll(&mut engine, started.elapsed().as_micros() as u64);
             engine.work();
         }
         let (lines, fault) = match (is(&port.off), is(&port.paper)) {

@@ -57,6 +57,14 @@ impl Chip {
         }
     }
 
+    /// What the bridge's image for it is called, and what a compiler makes it for.
+    pub fn image(self) -> (&'static str, &'static str) {
+        match self {
+            Chip::Rp2040 => ("foilpress-bridge.uf2", "thumbv6m-none-eabi"),
+            Chip::Rp2350 => ("foilpress-bridge-pico2.uf2", "thumbv8m.main-none-eabihf"),
+        }
+    }
+
     /// The board's flash, as the processor sees it: 2 or 4 MiB.
     pub fn flash(self) -> Range<u32> {
         match self {

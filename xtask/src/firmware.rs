@@ -95,6 +95,24 @@ pub fn build(root: &Path) -> Result<PathBuf> {
     build_for(pico, root, None)
 }
 
+/// Builds the images of the bridge and of the rig that the installed targets allow, and names what is missing. None at all is a failure.
+pub fn build_possible(root: &Path) -> Result<()> {
+    let sysroot = command("rustc", &["--print", "sysroot"]).output().context("there is no rustc")?.stdout;
+    let targets = Path::new(String::from_utf8(sysroot)?.trim()).join("lib/rustlib");
+    let (there, missing): (Vec<&Board>, Vec<&Board>) =
+        BOARDS.iter().chain([&RIG]).partition(|board| targets.join(board.target).join("lib").is_dir());
+    for board in &there {
+        build_for(board, root, None)?;
+    }
+    for Board { name, target, .. } in missing {
+        println!("{name} is not built, for its target is not installed: rustup target add {target}");
+    }
+    if there.is_empty() {
+        bail!("no target for a board is installed");
+    }
+    Ok(())
+}
+
 /// The link to the sources of a release.
 const LINK: &str = "/tmp/foilpress-release";
 

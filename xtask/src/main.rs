@@ -43,8 +43,14 @@ enum Task {
     },
     /// Run the benchmarks
     Bench,
-    /// Build the bridge's firmware as UF2 and check its size against xtask/budgets.toml
+    /// Build the firmware that the installed targets allow as UF2 and check its size against xtask/budgets.toml
     Firmware,
+    /// Change each decision of the bridge once, and say which of the changes no test notices: some hours
+    Mutants {
+        /// Numbers of mutants, or `--part` for a tenth of them
+        #[arg(allow_hyphen_values = true)]
+        which: Vec<String>,
+    },
     /// Test the firmware's image on an emulated board
     Emulator {
         /// Serve a bridge with a simulated printer on a serial port instead, until standard input ends
@@ -91,7 +97,8 @@ fn main() -> ExitCode {
     match Args::parse().task {
         Task::Test { full } => gate::run(root, full),
         Task::Bench => finish(succeed(&mut cargo(&["bench", "--workspace", "--locked"]))),
-        Task::Firmware => finish(firmware::build(root).and_then(|_| firmware::build_rig(root)).map(drop)),
+        Task::Firmware => finish(firmware::build_possible(root)),
+        Task::Mutants { which } => finish(mutants(&which)),
         Task::Emulator { serve: true } => finish(emulator::serve(root)),
         Task::Emulator { serve: false } => finish(emulator::alone(root)),
         Task::Preview => finish(preview::run(root)),
@@ -101,6 +108,11 @@ fn main() -> ExitCode {
         Task::Package { dev: true } => finish(package::build(root, package::Profile::Dev)),
         Task::Release { dry_run, only } => finish(release::run(root, &only, dry_run)),
     }
+}
+
+/// Tries the mutants of these numbers, or all.
+fn mutants(which: &[String]) -> anyhow::Result<()> {
+    succeed(cargo(&["run", "--locked", "--release", "--package", "foilpress-mutants", "--"]).args(which))
 }
 
 /// Checks licences, advisories, bans and sources of dependencies by `deny.toml`.

@@ -152,7 +152,7 @@ async fn main(spawner: Spawner) {
             None => Engine::new(memory, identity),
         })
     });
-    // Before a byte goes anywhere: the flash may say that the printer has to be reset first.
+    // Before a byte goes anywhere: the flash says where the printer stands.
     static ALONE: StaticCell<Alone<Area>> = StaticCell::new();
     if retained::flash_hung() {
         defmt::error!("the flash has not ended an operation: nothing is stored until the supply was away");
@@ -220,10 +220,13 @@ async fn main(spawner: Spawner) {
 async fn work(shared: &'static Shared) {
     loop {
         watch::show_life(Life::Work);
-        let Turn { more, wake_port } =
+        let Turn { more, wake_port, wake_store } =
             shared.engine(|engine| turn::work(engine, || Instant::now().as_ticks()));
         if wake_port {
             shared.wake(Side::Port);
+        }
+        if wake_store {
+            shared.wake(Side::Store);
         }
         if more {
             yield_now().await;

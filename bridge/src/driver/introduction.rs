@@ -1,7 +1,7 @@
 //! When to ask a printer for its device ID without having been told to.
 //!
 //! A printer is asked once each time it is switched on, after it has been ready for [`SETTLED_US`] without a break while
-//! nobody used it. Only once, whatever comes of it: negotiating disturbs a printer that does not know IEEE 1284.
+//! nobody used it and it was known to stand between two jobs. Only once, whatever comes of it: negotiating disturbs a printer that does not know IEEE 1284.
 
 use protocol::link::message::Lines;
 
@@ -30,7 +30,7 @@ pub(crate) enum Action {
 }
 
 impl Introduction {
-    /// Looks at the heeded lines. `free` says whether nobody uses the printer.
+    /// Looks at the heeded lines. `free` says whether nobody uses the printer, and it may be asked.
     pub(crate) fn look(&mut self, lines: Lines, free: bool, now_us: u64) -> Action {
         if !lines.high(Lines::POWER) {
             let asked = core::mem::replace(self, Introduction::Waiting) == Introduction::Asked;

@@ -280,18 +280,17 @@ where
         engine.port(self.lines, fault);
     }
 
-    /// Asks a printer that has been switched on for its device ID, when it is time.
+    /// Asks a printer that has been switched on for its device ID, when it is time and known to do no harm.
     fn introduce(&mut self, engine: &mut Engine<'_>, id: &mut DeviceId, now_us: u64) {
         let lines = self.lines.heeding(self.heed);
-        let free = self.owner != Owner::WiringTest && self.talk.is_none() && engine.is_idle();
+        let free = self.owner != Owner::WiringTest && self.talk.is_none() && engine.may_negotiate();
         match self.introduction.look(lines, free, now_us) {
             Action::Nothing => {}
             Action::Forget => id.forget(),
-            Action::Ask if engine.may_negotiate() => {
+            Action::Ask => {
                 self.take_pins(engine);
                 self.read(Purpose::Introduction, &[]);
             }
-            Action::Ask => {}
         }
     }
 
@@ -343,9 +342,10 @@ where
                 return self.go_on_asking(engine);
             }
             Task::Initialise => {
+                let before = self.is_powered();
                 self.port.initialise();
                 self.talks = false;
-                Outcome::Done
+                if before && self.is_powered() { Outcome::Done } else { Outcome::Unnoticed }
             }
             Task::Bootloader => {
                 self.board.start_boot_loader();
@@ -369,6 +369,11 @@ where
         }
     }
 
+    /// Whether the printer has its supply at this moment.
+    fn is_powered(&mut self) -> bool {
+        self.board.lines().heeding(self.heed).high(Lines::POWER)
+    }
+
     fn configure(&mut self, settings: &PortSettings) -> Result<(), BadSettings> {
         self.port.configure(settings)?;
         self.board.set_timing(&Timing::from_settings(settings)?);
@@ -386,8 +391,14 @@ where
             // One that takes no bytes takes no question. What it has to say does not outlive its supply.
             (_, Some(fault)) if fault == Fault::PowerOff || !question.is_put() => Some(Ended::Stopped(fault)),
             (Step::Write(bytes), _) => {
+                engine.begin_question();
+                self.keep(engine);
                 let written = self.port.write(bytes, wrapping_ms(now_us));
-                question.written(written, self.board.now_us())
+                let ended = question.written(written, self.board.now_us());
+                if !question.is_half_put() {
+                    engine.end_question();
+                }
+                ended
             }
             (Step::Read, _) => {
                 self.read(Purpose::Answer, question.so_far());

@@ -9,7 +9,7 @@
 //!
 //! Limits: an answer of fewer than 38 bytes is none. That goes for a single byte, too: what a printer means by one on
 //! this port is not known. A printer that stops inside a byte is taken at its word, and what came is passed on.
-//! A printer that shows a fault before it has taken both bytes is left with half a question.
+//! A printer that shows a fault before it has taken both bytes is left with half a question, and has to be reset.
 
 use crate::port::{ReverseError, Stop, Written};
 use heapless::Vec;
@@ -95,6 +95,11 @@ impl StatusQuestion {
     /// Whether the printer has taken all of it.
     pub(crate) fn is_put(&self) -> bool {
         self.taken == STATUS.len()
+    }
+
+    /// Whether the printer has taken a part of it.
+    pub(crate) fn is_half_put(&self) -> bool {
+        self.taken > 0 && !self.is_put()
     }
 
     /// What has come of the answer so far.

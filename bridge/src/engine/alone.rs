@@ -5,11 +5,11 @@
 //! it at the port is made by the same code. Between the engine and the store stands [`crate::alone`].
 
 use super::job::{Cancel, Phase, Way, positions};
-use super::{ALONE, Engine, LOCAL, NOTHING};
+use super::{ALONE, Engine, LOCAL};
 use crate::button::Press;
 use heapless::String;
 use protocol::link::message::{
-    Defect, DefectKind, JobKind, JobState, NAME_MAX, PastJob, Progress, Refusal, StoredJob, ToHost,
+    Defect, DefectKind, JobKind, JobState, NAME_MAX, PastJob, Refusal, StoredJob, ToHost,
 };
 
 /// What the store has to do.
@@ -100,10 +100,15 @@ impl Engine<'_> {
         self.job.is_none() && self.open(job, kind, length, Way::ToStore)
     }
 
-    /// The job that is being stored, and whether it is to be given up.
-    pub fn storing(&self) -> Option<(u32, bool)> {
+    /// Whether a job is being stored, and then whether it is to be given up.
+    pub fn storing(&self) -> Option<bool> {
         let job = self.job.as_ref().filter(|job| job.way == Way::ToStore)?;
-        Some((job.id, job.cancel != Cancel::None))
+        Some(job.cancel != Cancel::None)
+    }
+
+    /// How often the host has spoken of the job that is being stored; the count may wrap.
+    pub fn words_of_store(&self) -> u32 {
+        self.words_of_store
     }
 
     /// Moves the next bytes of the job that is being stored; false if not all of them are there.
@@ -139,15 +144,10 @@ impl Engine<'_> {
         }
     }
 
-    /// Opens a job whose data come from the store. False if another one is open, or there is no memory for any. A printer of which
-    /// nobody knows whether it stands between two jobs is reset before.
+    /// Opens a job whose data come from the store. False if another one is open, or there is no memory for any.
     pub fn open_from_store(&mut self, job: u32, kind: JobKind, length: u32) -> bool {
         self.due.progress = true;
-        if self.job.is_some() || !self.open(job, kind, length, Way::FromStore) {
-            return false;
-        }
-        self.reset_unless_at_rest();
-        true
+        self.job.is_none() && self.open(job, kind, length, Way::FromStore)
     }
 
     /// The job that was open at a reset of the board comes from the store, and does so again from its beginning.
@@ -188,30 +188,6 @@ impl Engine<'_> {
     /// The job that is open, whatever its way.
     pub fn open_job(&self) -> Option<u32> {
         self.job.as_ref().map(|job| job.id)
-    }
-
-    /// Whether the printer would have to be reset if the bridge lost its memory now: it must be already, or a job is open of which
-    /// neither a host nor the store knows.
-    pub fn leaves_a_reset(&self) -> bool {
-        self.owes_reset || self.job.as_ref().is_some_and(|job| job.id == LOCAL)
-    }
-
-    /// Whether the printer has to be reset before anything else goes to it.
-    pub fn owes_reset(&self) -> bool {
-        self.owes_reset
-    }
-
-    /// The printer has to be reset: that was written down before the supply went.
-    pub fn owe_reset(&mut self) {
-        self.owes_reset = true;
-        self.reset_if_owed();
-    }
-
-    /// The supply went while this job was printed from the store.
-    pub fn lost_from_store(&mut self, id: u32) {
-        self.last = Progress { job: id, state: JobState::Lost, ..NOTHING };
-        self.remember(PastJob { job: id, state: JobState::Lost, printed: 0 });
-        self.owe_reset();
     }
 
     /// This job was in the store already when the board was reset, and that it was is not remembered.

@@ -2,9 +2,10 @@
 
 use super::job::{Cancel, Job, Marks, Phase, Way, positions};
 use super::{ALONE, Due, Engine, Identity, LEAST_MEMORY, LOCAL, Request, Task};
+use crate::standing::Standing;
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
-    Answer, Ask, DATA_MAX, JobKind, JobState, Progress, Refusal, SCHEMA, ToBridge, ToHost, Usage, VERSION,
+    Answer, Ask, DATA_MAX, Fault, JobKind, Progress, Refusal, SCHEMA, ToBridge, ToHost, Usage, VERSION,
     hello_version,
 };
 use protocol::rgl::Track;
@@ -56,10 +57,7 @@ impl Engine<'_> {
             ToBridge::Data { job, offset, bytes } => self.take(job, offset, bytes),
             ToBridge::Cancel { job } => self.cancel(job),
             ToBridge::Ask { request, what: Ask::Lines } => self.due.lines = Some(request),
-            ToBridge::Ask { request, what: Ask::Printer } if !self.at_rest && self.job.is_none() => {
-                self.due.answer = Some((request, Answer::Unsure));
-            }
-            ToBridge::Ask { request, what: Ask::Printer | Ask::PrinterAtRest } => {
+            ToBridge::Ask { request, what: Ask::Printer | Ask::Vouched } => {
                 self.negotiate(request, Task::PrinterStatus);
             }
             ToBridge::Ask { request, what: Ask::DeviceId } => self.negotiate(request, Task::DeviceId),
@@ -68,20 +66,7 @@ impl Engine<'_> {
                 // Harmless at any time, and needed most when a job is stuck.
                 self.unless_busy(Task::Configure(settings), None);
             }
-            ToBridge::Initialise { request } => {
-                // A job from before a reset whose data are gone can only be given up.
-                if self.job.as_ref().is_some_and(|job| job.phase == Phase::Unknown) {
-                    self.end(JobState::Lost);
-                    self.owes_reset = true;
-                }
-                // One of which nothing has been made for the port yet is printed behind the reset.
-                let untouched = |job: &Job| job.printed == 0 && self.output.is_empty();
-                if self.job.as_ref().is_some_and(untouched) {
-                    self.unless_busy(Task::Initialise, Some(request));
-                } else {
-                    self.between_jobs(Task::Initialise, Some(request));
-                }
-            }
+            ToBridge::Initialise { request } => self.between_jobs(Task::Initialise, Some(request)),
             ToBridge::Bootloader => self.between_jobs(Task::Bootloader, None),
             ToBridge::Drive { data, control } => self.between_jobs(Task::Drive { data, control }, None),
             ToBridge::Probe { request, data, control } => self.ask(request, Task::Probe { data, control }),
@@ -103,7 +88,7 @@ impl Engine<'_> {
     }
 
     fn greet(&mut self) {
-        (self.due.hello, self.due.past, self.due.progress) = (true, true, true);
+        (self.due.hello, self.due.past, self.due.progress, self.due.standing) = (true, true, true, true);
     }
 
     /// Whether a host may open this job now. If not, or if it is open already, the host is told where it stands.
@@ -114,6 +99,9 @@ impl Engine<'_> {
         }
         self.due.progress = true;
         if let Some(job) = &mut self.job {
+            if job.id == id && job.way == Way::ToStore {
+                self.words_of_store = self.words_of_store.wrapping_add(1);
+            }
             if job.id != id {
                 self.refuse(Refusal::JobOpen, id);
             } else if job.phase == Phase::Unknown {
@@ -151,17 +139,13 @@ impl Engine<'_> {
     /// Returns the number of bytes taken. The rest must be offered again, which on USB is a NAK. The engine takes nothing
     /// while a job of the link is open or the end of the last one has not crossed the port.
     ///
-    /// A job ends with the reset after its rows, or else with [`Engine::local_end`]. A printer of which nobody knows whether it
-    /// stands between two jobs is reset before the first byte.
+    /// A job ends with the reset after its rows, or else with [`Engine::local_end`].
     pub fn local(&mut self, bytes: &[u8]) -> usize {
         if bytes.is_empty() {
             return 0;
         }
-        if self.job.is_none() {
-            if !self.open(LOCAL, JobKind::Raw, u32::MAX, Way::ToPort) {
-                return 0;
-            }
-            self.reset_unless_at_rest();
+        if self.job.is_none() && !self.open(LOCAL, JobKind::Raw, u32::MAX, Way::ToPort) {
+            return 0;
         }
         let Some(job) = &mut self.job else { return 0 };
         if job.id != LOCAL || job.phase != Phase::Running || job.length != u32::MAX {
@@ -229,6 +213,9 @@ impl Engine<'_> {
             }
             return;
         };
+        if job.way == Way::ToStore {
+            self.words_of_store = self.words_of_store.wrapping_add(1);
+        }
         let end = u64::from(offset) + bytes.len() as u64;
         let of_host = job.phase == Phase::Running && job.way != Way::FromStore;
         if !of_host || offset > job.accepted || end <= u64::from(job.accepted) {
@@ -295,15 +282,16 @@ impl Engine<'_> {
         }
     }
 
-    /// A question that needs a negotiation with the printer.
+    /// A question that needs a negotiation with the printer, and so one that is known to stand between two jobs.
     fn negotiate(&mut self, request: u16, task: Task) {
-        if self.job.is_none() && self.owes_reset && task == Task::PrinterStatus {
-            self.due.answer = Some((request, Answer::Unsure));
-        } else if self.job.is_none() && self.one_way {
-            self.due.answer = Some((request, Answer::OneWay));
-        } else {
-            self.ask(request, task);
-        }
+        let answer = match self.standing {
+            _ if !self.is_idle() => Answer::NotNow,
+            _ if self.is_off() => Answer::Stopped(Fault::PowerOff),
+            Standing::AtRest if self.one_way => Answer::OneWay,
+            Standing::AtRest => return self.ask(request, task),
+            Standing::Unknown { .. } | Standing::InSheet(_) => Answer::Unsure,
+        };
+        self.due.answer = Some((request, answer));
     }
 
     fn ask(&mut self, request: u16, task: Task) {
@@ -344,6 +332,10 @@ impl Engine<'_> {
             self.due.progress = false;
             self.reported = now;
             return wrote(ToHost::Progress(now), out);
+        }
+        if core::mem::take(&mut self.due.standing) {
+            let (standing, job) = (self.standing.told(), self.standing.job());
+            return wrote(ToHost::Standing { standing, job }, out);
         }
         if let Some(request) = self.due.lines.take() {
             return wrote(ToHost::Lines { request, lines: self.lines, fault: self.fault }, out);

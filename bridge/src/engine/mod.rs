@@ -11,7 +11,8 @@
 //! * [`Engine::task`] for what only the board can do, [`Engine::done`] for its outcome;
 //! * a piece of the log to [`Engine::log`] when [`Engine::log_wanted`], its own use to [`Engine::usage`] when
 //!   [`Engine::usage_wanted`]; [`Engine::transmit`] to the link until it returns nothing;
-//! * what is to be stored, or printed from the store, between this and a store ([`crate::alone`]);
+//! * what is to be stored, or printed from the store, and which job's sheet is to be noted, between this and a store
+//!   ([`crate::alone`]);
 //! * [`Engine::checkpoint`] to memory that outlives a reset, whenever bytes were consumed.
 //!
 //! **One byte, once.** Data carry their offset, and only the byte that comes next is taken. The bytes made from them
@@ -19,10 +20,8 @@
 //! [`Checkpoint`] the host sends the data again from the beginning. The engine works through them again and leaves out
 //! as many bytes as had crossed the port.
 //!
-//! **What the printer stands in.** A question to the printer is two bytes at its port. They are row data to a printer inside a
-//! job, and nothing to one that cannot answer. So the engine knows whether the printer stands between two jobs: from the end of
-//! a job, a reset or the printer's switch on, and not when the bridge itself has just lost its memory. Nothing is given out
-//! while the printer's supply is absent.
+//! **Where the printer stands** ([`Standing`]) is asked at one gate: [`Engine::output`] gives bytes of a job in its own sheet only, and
+//! [`Engine::step_in`] leads there. Nothing is given out while the printer's supply is absent.
 //!
 //! **Two queues.** Accepted data wait in one, printer bytes in the other, so the port has work while a band is being
 //! decoded, and the link has credit while the printer is busy.
@@ -33,9 +32,11 @@ mod link;
 mod work;
 
 pub use self::alone::Request;
+pub use protocol::link::message::LOCAL;
 
 use self::job::{Cancel, Job, Marks, Phase, Way, positions};
 use crate::ring::Ring;
+use crate::standing::{QUESTION, Standing};
 use crate::streams::{Streams, WRITE_ROOM};
 use heapless::Vec;
 use protocol::link::frame::MAX;
@@ -61,9 +62,6 @@ pub struct Memory<'m> {
 
 /// Least size of [`Memory::data`] and [`Memory::output`]. With less, the engine takes no job.
 pub const LEAST_MEMORY: usize = 2048;
-
-/// Number of a job that came through [`Engine::local`] and not through the link.
-pub const LOCAL: u32 = u32::MAX;
 
 /// Who the bridge is, for the host.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -110,6 +108,8 @@ pub enum Task {
 pub enum Outcome<'a> {
     /// Done, with nothing to report.
     Done,
+    /// Done, and the printer cannot have noticed: it was without its supply.
+    Unnoticed,
     /// The port cannot work with these settings.
     BadSettings,
     /// The answer to a question.
@@ -125,10 +125,8 @@ pub struct Checkpoint {
     pub progress: Progress,
     /// Where its early end begins, in bytes at the port, once that is decided.
     pub ends_at: Option<u32>,
-    /// Whether the printer still has to be reset: after this job or, if it is open, before its first byte.
-    pub needs_reset: bool,
-    /// Whether the printer is known to stand between two jobs, if none is open.
-    pub at_rest: bool,
+    /// Where the printer stands.
+    pub standing: Standing,
     /// Whether the printer has shown that it does not negotiate.
     pub one_way: bool,
     /// Whether bytes were on their way to a printer that takes them.
@@ -146,7 +144,7 @@ impl Checkpoint {
         let Progress { job, printed, .. } = self.progress;
         if self.flowing && self.progress.is_open() && self.past.iter().all(|past| past.job != job) {
             self.progress.state = JobState::Lost;
-            self.needs_reset = true;
+            self.standing.tear();
             if job != LOCAL && job != ALONE {
                 self.past.rotate_right(1);
                 self.past[0] = PastJob { job, state: JobState::Lost, printed };
@@ -181,6 +179,7 @@ struct Due {
     progress: bool,
     lines: Option<u16>,
     past: bool,
+    standing: bool,
     refused: Option<(Refusal, u32)>,
     /// Number of a question that needs no board, and the answer.
     answer: Option<(u16, Answer<'static>)>,
@@ -217,13 +216,12 @@ pub struct Engine<'m> {
     lines: Lines,
     fault: Option<Fault>,
     board: Board,
-    /// A job has ended where the printer's state is not known: the printer gets no byte before it was reset, whatever job
-    /// is open now.
-    owes_reset: bool,
+    /// Where the printer stands.
+    standing: Standing,
+    /// Somebody notes which sheet the printer is in before its first byte leaves ([`Engine::begin_sheet`]).
+    keeps_diary: bool,
     /// The host gives up this job: it ends once the board has nothing in flight, with the printer's reset.
     abandoned: Option<u32>,
-    /// The printer is known to stand between two jobs, if none is open.
-    at_rest: bool,
     /// The printer has shown that it does not negotiate, and was not switched off or reset since.
     one_way: bool,
     /// Somebody holds the job with the button: the printer gets nothing.
@@ -232,6 +230,8 @@ pub struct Engine<'m> {
     request: Option<Request>,
     /// Jobs in the store.
     stored: usize,
+    /// How often the host has spoken of a job that is being stored.
+    words_of_store: u32,
 }
 
 const NOTHING: Progress =
@@ -261,54 +261,57 @@ impl<'m> Engine<'m> {
             lines: Lines::IDLE,
             fault: None,
             board: Board::Free,
-            owes_reset: false,
+            standing: Standing::UNKNOWN,
+            keeps_diary: false,
             abandoned: None,
-            at_rest: false,
             one_way: false,
             held: false,
             request: None,
             stored: 0,
+            words_of_store: 0,
         }
     }
 
     /// An engine that continues where another one was when it was reset.
     pub fn resume(memory: Memory<'m>, identity: Identity, checkpoint: Checkpoint) -> Self {
         let mut engine = Self::new(memory, identity);
-        let Checkpoint { progress, ends_at, needs_reset, at_rest, one_way, past, .. } = checkpoint;
-        (engine.owes_reset, engine.at_rest, engine.one_way) = (needs_reset, at_rest, one_way);
-        engine.past = past;
-        if progress.job == 0 || !progress.is_open() {
-            engine.last = progress;
-            return engine;
+        let Checkpoint { standing, one_way, past, .. } = checkpoint;
+        (engine.standing, engine.one_way, engine.past) = (standing, one_way, past);
+        engine.resume_job(&checkpoint);
+        if engine.job.as_ref().map(|job| job.id) != Some(engine.standing.job()) {
+            // What it was in goes on no more: a plain job, a question, or a job that ended as the board was reset.
+            engine.standing.tear();
         }
-        if progress.job == LOCAL {
-            // An operating system does not send again what it has sent to a plain printer.
-            engine.last = Progress { state: JobState::Lost, ..progress };
-            // Once it is seen to be there.
-            engine.owes_reset = true;
-            return engine;
-        }
-        if let Some(PastJob { state, printed, .. }) = engine.remembered(progress.job) {
-            // The reset came between the job's end and this checkpoint.
-            engine.last = Progress { state, printed, limit: progress.accepted, ..progress };
-            return engine;
-        }
-        if progress.state == JobState::Storing {
-            // What is stored of it does not count.
-            engine.last = Progress { state: JobState::Cancelled, limit: progress.accepted, ..progress };
-            engine.remember(PastJob { job: progress.job, state: JobState::Cancelled, printed: 0 });
-            return engine;
-        }
-        engine.job = Some(Job {
-            printed: progress.printed,
-            phase: Phase::Unknown,
-            // The host repeats a cancel whose place was not decided.
-            cancel: ends_at.map_or(Cancel::None, Cancel::Decided),
-            pass: progress.pass,
-            row: progress.row,
-            ..Job::new(progress.job, JobKind::Raw, 0, Way::ToPort)
-        });
         engine
+    }
+
+    /// Opens the job that was open at a reset, as far as it can go on.
+    fn resume_job(&mut self, checkpoint: &Checkpoint) {
+        let Checkpoint { progress, ends_at, .. } = *checkpoint;
+        let ended = |state| Progress { state, limit: progress.accepted, ..progress };
+        if progress.job == 0 || !progress.is_open() {
+            self.last = progress;
+        } else if progress.job == LOCAL {
+            // An operating system does not send again what it has sent to a plain printer.
+            self.last = ended(JobState::Lost);
+        } else if let Some(PastJob { state, printed, .. }) = self.remembered(progress.job) {
+            // The reset came between the job's end and this checkpoint.
+            self.last = Progress { printed, ..ended(state) };
+        } else if progress.state == JobState::Storing {
+            // What is stored of it does not count.
+            self.last = ended(JobState::Cancelled);
+            self.remember(PastJob { job: progress.job, state: JobState::Cancelled, printed: 0 });
+        } else {
+            self.job = Some(Job {
+                printed: progress.printed,
+                phase: Phase::Unknown,
+                // The host repeats a cancel whose place was not decided.
+                cancel: ends_at.map_or(Cancel::None, Cancel::Decided),
+                pass: progress.pass,
+                row: progress.row,
+                ..Job::new(progress.job, JobKind::Raw, 0, Way::ToPort)
+            });
+        }
     }
 
     /// Its memory, for the engine after a reset of a simulated board.
@@ -327,9 +330,7 @@ impl<'m> Engine<'m> {
         Checkpoint {
             progress,
             ends_at: self.job.as_ref().and_then(Job::ends_at),
-            // What an open job needs behind it turns out again when the job is worked through again.
-            needs_reset: self.owes_reset,
-            at_rest: self.at_rest,
+            standing: self.standing,
             one_way: self.one_way,
             flowing: self.fault.is_none() && !self.output().is_empty(),
             past: self.past,
@@ -373,10 +374,12 @@ impl<'m> Engine<'m> {
 
     /// Bytes for the port after the next `skip`, which are already on their way.
     pub fn output_behind(&self, skip: usize) -> &[u8] {
-        // Nothing else uses the port during a task, a printer that must be reset gets nothing before that, and one without its
-        // supply nothing at all.
-        match self.board {
-            Board::Free if !self.owes_reset && !self.is_off() && !self.held => self.output.behind(skip),
+        // Nothing else uses the port during a task.
+        match (&self.job, self.board) {
+            (Some(job), Board::Free) if !self.is_off() && !self.held => match self.standing {
+                Standing::InSheet(sheet) if sheet == job.id => self.output.behind(skip),
+                _ => &[],
+            },
             _ => &[],
         }
     }
@@ -399,18 +402,16 @@ impl<'m> Engine<'m> {
     pub fn port(&mut self, lines: Lines, fault: Option<Fault>) {
         (self.lines, self.fault) = (lines, fault);
         if self.is_off() {
-            // Another one may be behind the cable when it is on again.
+            // Another one may be behind the cable when it is on again; or the same, which has forgotten what it had if it was
+            // switched off, and has it still if only the cable was pulled.
             self.one_way = false;
-            self.at_rest = true;
+            let crossed = self.job.as_ref().is_some_and(|job| job.printed > 0);
+            self.standing.lose_supply(crossed);
+            if crossed {
+                self.end(JobState::Lost);
+            }
         }
-        if self.is_off() && self.job.as_ref().is_some_and(|job| job.printed > 0) {
-            // A printer that is switched on again would print the rest of a row as text. If only the cable was pulled,
-            // it would read the next job as the rest of the row.
-            self.end(JobState::Lost);
-            self.owes_reset = true;
-        } else if self.owes_reset && fault.is_none() {
-            self.assign(Task::Initialise, None);
-        }
+        self.step_in();
     }
 
     /// Whether the printer's supply is absent.
@@ -428,9 +429,9 @@ impl<'m> Engine<'m> {
         self.job.is_none() && matches!(self.board, Board::Free)
     }
 
-    /// Whether a negotiation with the printer may have an answer: it has not shown that it does not negotiate.
+    /// Whether the printer may be asked who it is: it is known to stand between two jobs, and has not shown that it does not negotiate.
     pub fn may_negotiate(&self) -> bool {
-        !self.one_way
+        self.is_idle() && self.standing == Standing::AtRest && !self.one_way
     }
 
     /// The printer has not answered a negotiation. It is not tried again before it was switched off or reset.
@@ -449,8 +450,12 @@ impl<'m> Engine<'m> {
     pub fn done(&mut self, outcome: Outcome<'_>) {
         let board = core::mem::replace(&mut self.board, Board::Free);
         let (Board::Assigned(done) | Board::Working(done)) = board else { return };
-        if done.task == Task::Initialise {
-            self.initialised();
+        match done.task {
+            Task::Initialise => self.initialised(outcome != Outcome::Unnoticed),
+            // The printer has half of the question.
+            Task::PrinterStatus => self.standing.tear(),
+            Task::Drive { .. } | Task::Probe { .. } => self.standing.disturb(),
+            Task::Configure(_) | Task::DeviceId | Task::Bootloader => {}
         }
         match (outcome, done.request) {
             (Outcome::BadSettings, _) => self.refuse(Refusal::Settings, 0),
@@ -458,43 +463,104 @@ impl<'m> Engine<'m> {
             (Outcome::Lines(lines), Some(request)) => {
                 self.prepare(&ToHost::Lines { request, lines, fault: lines.fault() });
             }
-            (Outcome::Done, Some(request)) => self.due.lines = Some(request),
-            (Outcome::Done | Outcome::Answer(_) | Outcome::Lines(_), _) => {}
+            (Outcome::Done | Outcome::Unnoticed, Some(request)) => self.due.lines = Some(request),
+            (Outcome::Done | Outcome::Unnoticed | Outcome::Answer(_) | Outcome::Lines(_), _) => {}
         }
-        self.reset_if_owed();
+        self.step_in();
     }
 
-    /// The printer was reset, with nothing in flight.
-    fn initialised(&mut self) {
-        // A printer that is off has not noticed.
-        let noticed = !self.is_off();
+    /// The status question is about to be put: a job of two bytes.
+    pub fn begin_question(&mut self) {
+        self.standing.enter(QUESTION);
+    }
+
+    /// The printer has taken none of the question's bytes, or all of them.
+    pub fn end_question(&mut self) {
+        self.standing.end();
+    }
+
+    /// The printer was reset, with nothing in flight. One without its supply has not noticed.
+    fn initialised(&mut self, noticed: bool) {
+        let noticed = noticed && !self.is_off();
         let abandoned = self.abandoned.take();
         if let Some(job) = &self.job
             && abandoned == Some(job.id)
         {
             let begun = job.printed > 0;
+            if begun {
+                self.standing.tear();
+            } else {
+                self.standing.end();
+            }
             self.end(if begun { JobState::Lost } else { JobState::Cancelled });
-            self.owes_reset |= begun;
         }
-        self.owes_reset &= !noticed;
         if noticed {
-            (self.at_rest, self.one_way) = (true, false);
+            self.standing.reset();
+            self.one_way = false;
         }
     }
 
-    /// Has the printer reset unless it is known to stand between two jobs. One with a fault waits for its end, since its supply may
-    /// be gone for too short a time to count yet.
-    fn reset_unless_at_rest(&mut self) {
-        self.owes_reset |= !self.at_rest;
-        if self.fault.is_none() {
-            self.reset_if_owed();
+    /// Where the printer stands.
+    pub fn standing(&self) -> Standing {
+        self.standing
+    }
+
+    /// From now on no first byte of a job leaves before [`Engine::begin_sheet`].
+    pub fn keep_diary(&mut self) {
+        self.keeps_diary = true;
+    }
+
+    /// What the diary says to a board without memory: whether the printer stands between two jobs, and the job that was lost, or 0. If it
+    /// does not stand there, it may have a part of that job.
+    pub fn wake(&mut self, at_rest: bool, lost: u32) {
+        self.standing = if at_rest { Standing::AtRest } else { Standing::Unknown { job: lost, due: false } };
+        if lost != QUESTION {
+            self.last = Progress { job: lost, state: JobState::Lost, ..NOTHING };
+            self.remember(PastJob { job: lost, state: JobState::Lost, printed: 0 });
         }
     }
 
-    /// Has the printer reset, if it must be and can be.
-    fn reset_if_owed(&mut self) {
-        if self.owes_reset && !self.is_off() {
+    /// Whether this job is known to be lost.
+    pub fn has_lost(&self, job: u32) -> bool {
+        let last = self.last.job == job && self.last.state == JobState::Lost;
+        last || self.remembered(job).is_some_and(|past| past.state == JobState::Lost)
+    }
+
+    /// The job whose first byte would leave now, were its sheet noted.
+    pub fn waits_to_begin(&self) -> Option<u32> {
+        let free = matches!(self.board, Board::Free) && self.standing == Standing::AtRest;
+        self.job.as_ref().filter(|_| free && self.has_bytes()).map(|job| job.id)
+    }
+
+    /// It is noted that the printer is in this job's sheet: its bytes may leave.
+    pub fn begin_sheet(&mut self, job: u32) {
+        if self.waits_to_begin() == Some(job) {
+            self.standing.enter(job);
+        }
+    }
+
+    /// Whether there are bytes for a printer that takes them.
+    fn has_bytes(&self) -> bool {
+        self.fault.is_none() && !self.held && !self.output.is_empty()
+    }
+
+    /// Takes the next step towards the sheet of the open job: a reset of a printer of which nothing is known, then the sheet itself. A
+    /// printer with a fault waits for its end, since its supply may be gone for too short a time to count yet.
+    pub(super) fn step_in(&mut self) {
+        if let Standing::Unknown { due, .. } = self.standing
+            && (due && self.fault.is_none() || self.job.is_some() && self.has_bytes())
+        {
             self.assign(Task::Initialise, None);
+        }
+        self.begin_unnoted();
+    }
+
+    /// Begins the sheet that waits, where nobody notes that.
+    pub(super) fn begin_unnoted(&mut self) {
+        if !self.keeps_diary
+            && let Some(job) = self.waits_to_begin()
+        {
+            self.standing.enter(job);
         }
     }
 

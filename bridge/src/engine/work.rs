@@ -17,6 +17,7 @@ impl Engine<'_> {
             JobKind::Streams => self.work_streams(),
         };
         self.settle();
+        self.begin_unnoted();
         worked
     }
 
@@ -186,10 +187,14 @@ impl Engine<'_> {
         if let Phase::Ending { state, needs_reset } = job.phase
             && self.output.is_empty()
         {
+            // Of which no byte has crossed, it is as if it had not been.
+            if needs_reset && job.printed > 0 {
+                self.standing.tear();
+            } else {
+                self.standing.end();
+            }
             self.end(state);
-            self.at_rest |= self.last.printed > 0;
-            self.owes_reset |= needs_reset;
-            self.reset_if_owed();
+            self.step_in();
         }
     }
 

@@ -5,14 +5,12 @@
 //! It runs while the clock does, so the processor's side sees it at any point of a byte. The program itself, its DMA and
 //! its interrupt run in the emulator only.
 
-use super::{Line, SimulatedPort, World};
-use crate::driver::{Board, Clock, Event, Retained, Sender, TwoBuffers};
+use super::{Cable, Line, SimulatedPort, World};
+use crate::driver::{Board, Clock, Event, Retained, Sender};
 use crate::engine::Checkpoint;
 use crate::port::Timing;
 use protocol::link::message::Lines;
-use std::cell::RefCell;
 use std::collections::VecDeque;
-use std::rc::Rc;
 use std::vec::Vec;
 
 /// Bytes in each of the sender's buffers.
@@ -118,33 +116,43 @@ impl World {
 /// The board. Its clones are the same board.
 #[derive(Clone)]
 pub struct SimulatedBoard {
-    world: Rc<RefCell<World>>,
-    buffers: Rc<RefCell<TwoBuffers>>,
+    world: Cable,
 }
 
 impl SimulatedBoard {
     /// A board at this end of the cable, which it does not drive yet.
     pub fn new(port: &SimulatedPort) -> Self {
-        port.0.borrow_mut().enable(false);
-        SimulatedBoard { world: port.0.clone(), buffers: Rc::default() }
+        port.0.look().enable(false);
+        SimulatedBoard { world: port.0.clone() }
     }
 
     /// What the log says.
     pub fn events(&self) -> Vec<Event> {
-        self.world.borrow().events.clone()
+        self.world.look().events.clone()
     }
 
     /// How often the boot loader was started.
     pub fn boots(&self) -> usize {
-        self.world.borrow().boots
+        self.world.look().boots
+    }
+
+    /// A byte whose strobe is under way comes to its end.
+    pub fn halt(&self) {
+        self.world.look().finish_byte();
+    }
+
+    /// Bytes that were marked since the last checkpoint.
+    pub fn marks(&self) -> u32 {
+        self.world.look().marks
     }
 
     /// What the board finds in its memory when it is reset now: the last checkpoint, with the bytes that were marked since.
     /// A byte whose strobe is under way comes to its end first.
     pub fn reset(self) -> Option<Checkpoint> {
-        let mut world = self.world.borrow_mut();
+        let mut world = self.world.look();
         world.finish_byte();
         world.strobing = Strobing::new();
+        world.buffers.clear();
         world.enable(false);
         let marks = core::mem::take(&mut world.marks);
         let mut checkpoint = world.checkpoint?;
@@ -154,6 +162,17 @@ impl SimulatedBoard {
 }
 
 impl World {
+    /// Bytes cross one after the other until then, while the lines are well, without an edge.
+    pub(crate) fn cross(&mut self, until: u64) {
+        if self.strobing.connected && self.enabled && self.is_ready() {
+            let each = 24 * self.strobing.tick + self.peripheral.work;
+            let count = ((until - self.now) / each).min(self.strobing.bytes.len() as u64) as usize;
+            self.taken.extend(self.strobing.bytes.drain(..count));
+            self.strobing.counted += count;
+            self.marks += count as u32;
+        }
+    }
+
     /// Lets time pass until no strobe is under way.
     fn finish_byte(&mut self) {
         while matches!(self.strobing.step, Step::Rise | Step::Count) {
@@ -164,74 +183,75 @@ impl World {
 
 impl Clock for SimulatedBoard {
     fn now_us(&self) -> u64 {
-        self.world.borrow().now / 1000
+        self.world.look().now / 1000
     }
 }
 
 impl Sender for SimulatedBoard {
     fn set_timing(&mut self, timing: &Timing) {
-        self.world.borrow_mut().strobing.tick = tick(timing);
+        self.world.look().strobing.tick = tick(timing);
     }
 
     fn connect(&mut self) {
-        let mut world = self.world.borrow_mut();
+        let mut world = self.world.look();
         assert_eq!(world.level(Line::Strobe), 1, "the pins change hands with nStrobe low");
         world.strobing.connected = true;
     }
 
     fn disconnect(&mut self) {
-        let mut world = self.world.borrow_mut();
+        let mut world = self.world.look();
         assert_eq!(world.level(Line::Strobe), 1, "the pins change hands with nStrobe low");
         assert!(world.strobing.bytes.is_empty(), "the pins change hands with bytes in flight");
         world.strobing.connected = false;
     }
 
     fn has_room(&self) -> bool {
-        self.buffers.borrow().free().is_some()
+        self.world.look().buffers.free().is_some()
     }
 
     fn give(&mut self, bytes: &[u8]) -> usize {
-        if !self.has_room() {
+        let mut world = self.world.look();
+        if world.buffers.free().is_none() {
             return 0;
         }
         let count = bytes.len().min(CHUNK);
-        let mut world = self.world.borrow_mut();
         assert!(world.strobing.connected, "bytes for a sender that has no pins");
         world.strobing.bytes.extend(&bytes[..count]);
-        self.buffers.borrow_mut().fill(count as u32);
+        world.buffers.fill(count as u32);
         count
     }
 
     fn in_flight(&self) -> usize {
-        self.buffers.borrow().in_flight() as usize
+        self.world.look().buffers.in_flight() as usize
     }
 
     fn sent(&mut self) -> usize {
-        let sent = core::mem::take(&mut self.world.borrow_mut().strobing.counted);
-        self.buffers.borrow_mut().empty(sent as u32);
+        let mut world = self.world.look();
+        let sent = core::mem::take(&mut world.strobing.counted);
+        world.buffers.empty(sent as u32);
         sent
     }
 
     fn stop(&mut self) -> usize {
         {
-            let mut world = self.world.borrow_mut();
+            let mut world = self.world.look();
             world.finish_byte();
             world.strobing.bytes.clear();
             world.strobing.step = Step::Wait;
         }
         let sent = self.sent();
-        self.buffers.borrow_mut().clear();
+        self.world.look().buffers.clear();
         sent
     }
 }
 
 impl Retained for SimulatedBoard {
     fn mark(&mut self) {
-        self.world.borrow_mut().marks += 1;
+        self.world.look().marks += 1;
     }
 
     fn store(&mut self, checkpoint: Checkpoint) {
-        let mut world = self.world.borrow_mut();
+        let mut world = self.world.look();
         // The marks of bytes that the checkpoint covers; those the sender has counted since are not reported yet.
         world.marks = world.strobing.counted as u32;
         world.checkpoint = Some(checkpoint);
@@ -240,7 +260,7 @@ impl Retained for SimulatedBoard {
 
 impl Board for SimulatedBoard {
     fn lines(&mut self) -> Lines {
-        let mut world = self.world.borrow_mut();
+        let mut world = self.world.look();
         world.pass(8);
         let lines = [
             (Line::Ack, Lines::ACK),
@@ -254,14 +274,17 @@ impl Board for SimulatedBoard {
     }
 
     fn enable(&mut self, on: bool) {
-        self.world.borrow_mut().enable(on);
+        self.world.look().enable(on);
     }
 
     fn start_boot_loader(&mut self) {
-        self.world.borrow_mut().boots += 1;
+        self.world.look().boots += 1;
     }
 
     fn log(&mut self, event: Event) {
-        self.world.borrow_mut().events.push(event);
+        let mut world = self.world.look();
+        if !world.quick {
+            world.events.push(event);
+        }
     }
 }

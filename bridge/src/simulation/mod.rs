@@ -6,6 +6,9 @@
 //! bytes it has taken, what it would send back and every edge on the way can be looked at afterwards.
 //! [`SimulatedBoard`] is what the driver needs beside the pins.
 //!
+//! Where millions of bytes cross, [`SimulatedPort::quick`] lets the sender's bytes cross by their number: the same bytes at the same
+//! levels, without an edge for each.
+//!
 //! Limits: edges are ideal, no analogue behaviour of a cable is modelled.
 
 mod board;
@@ -18,14 +21,13 @@ pub use check::{Violation, check};
 pub use peripheral::{Pause, Peripheral, Response};
 pub use pins::{AckLine, DataLines, DelayLine, InLine, OutLine};
 
-use crate::driver::Event;
+use crate::driver::{Event, TwoBuffers};
 use crate::engine::Checkpoint;
 use crate::port::Pins;
 use board::Strobing;
 use peripheral::Phase;
-use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::rc::Rc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::vec::Vec;
 
 /// A line of the port.
@@ -88,6 +90,9 @@ pub(crate) struct World {
     /// What the printer will have to say, and from when on.
     responses: Vec<(u64, Vec<u8>)>,
     strobing: Strobing,
+    buffers: TwoBuffers,
+    /// Bytes cross by their number, and no edge is recorded.
+    quick: bool,
     /// Bytes sent since the last checkpoint.
     marks: u32,
     checkpoint: Option<Checkpoint>,
@@ -95,9 +100,19 @@ pub(crate) struct World {
     boots: usize,
 }
 
+/// What its pins, its board and its printer share.
+#[derive(Clone)]
+struct Cable(Arc<Mutex<World>>);
+
+impl Cable {
+    fn look(&self) -> MutexGuard<'_, World> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
 /// The cable and what hangs at its end. Clones are the same cable.
 #[derive(Clone)]
-pub struct SimulatedPort(Rc<RefCell<World>>);
+pub struct SimulatedPort(Cable);
 
 /// The pins of a simulated port.
 pub type SimulatedPins = Pins<DataLines, OutLine, InLine, AckLine>;
@@ -111,7 +126,7 @@ impl SimulatedPort {
         {
             levels[line as usize] = 1;
         }
-        SimulatedPort(Rc::new(RefCell::new(World {
+        SimulatedPort(Cable(Arc::new(Mutex::new(World {
             now: 0,
             plan: BTreeMap::new(),
             planned: 0,
@@ -129,11 +144,13 @@ impl SimulatedPort {
             off: false,
             responses: Vec::new(),
             strobing: Strobing::new(),
+            buffers: TwoBuffers::new(),
+            quick: false,
             marks: 0,
             checkpoint: None,
             events: Vec::new(),
             boots: 0,
-        })))
+        }))))
     }
 
     /// The host's end, and the clock to wait by.
@@ -158,37 +175,58 @@ impl SimulatedPort {
 
     /// Lets time pass, in ns.
     pub fn pass(&self, ns: u64) {
-        self.0.borrow_mut().pass(ns);
+        self.0.look().pass(ns);
     }
 
     /// The time, in ns.
     pub fn now(&self) -> u64 {
-        self.0.borrow().now
+        self.0.look().now
     }
 
     /// Changes a line of the printer in `after` ns, whatever its model says.
     pub fn plan(&self, after: u64, line: Line, level: u8) {
-        self.0.borrow_mut().plan(after, line, level);
+        self.0.look().plan(after, line, level);
     }
 
     /// Switches the printer on or off. What it was at work on, and what was planned, is gone.
     pub fn switch(&self, on: bool) {
-        self.0.borrow_mut().switch(on);
+        self.0.look().switch(on);
     }
 
     /// The bytes the printer has taken.
     pub fn taken(&self) -> Vec<u8> {
-        self.0.borrow().taken.clone()
+        self.0.look().taken.clone()
     }
 
     /// Every change of every line.
     pub fn edges(&self) -> Vec<Edge> {
-        self.0.borrow().edges.clone()
+        self.0.look().edges.clone()
+    }
+
+    /// From now on the sender's bytes cross by their number, and neither edges nor events are recorded.
+    pub fn quick(&self) {
+        self.0.look().quick = true;
+    }
+
+    /// The bytes the printer has taken since this was last asked.
+    pub fn drain(&self) -> Vec<u8> {
+        core::mem::take(&mut self.0.look().taken)
+    }
+
+    /// What the printer will answer to the status question, a millisecond behind it.
+    pub fn answer(&self, bytes: &[u8]) {
+        let response = Response { after: 1_000_000, bytes: bytes.to_vec() };
+        self.0.look().peripheral.status = std::vec![response];
+    }
+
+    /// The printer has a fault for a while when it has taken so many bytes since [`SimulatedPort::drain`].
+    pub fn pause(&self, pause: Pause) {
+        self.0.look().peripheral.pauses = std::vec![pause];
     }
 
     /// How often nInit has reset the printer.
     pub fn resets(&self) -> usize {
-        self.0.borrow().resets
+        self.0.look().resets
     }
 }
 
@@ -206,7 +244,10 @@ impl World {
         let until = self.now + ns;
         loop {
             let planned = self.plan.first_key_value().map(|(&(at, _), _)| at);
-            let strobes = self.strobes_at();
+            let strobes = if self.quick { None } else { self.strobes_at() };
+            if self.quick {
+                self.cross(planned.map_or(until, |at| at.min(until)));
+            }
             match (planned, strobes) {
                 (Some(at), _) if at <= until && strobes.is_none_or(|strobes| at <= strobes) => {
                     self.now = at;
@@ -230,7 +271,9 @@ impl World {
             return false;
         }
         self.levels[line as usize] = level;
-        self.edges.push(Edge { at: self.now, line, level });
+        if !self.quick {
+            self.edges.push(Edge { at: self.now, line, level });
+        }
         if line == Line::Ack && level == 0 {
             self.ack_latch = true;
         }

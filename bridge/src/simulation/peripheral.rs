@@ -195,7 +195,7 @@ impl World {
         let mut busy = work;
         let count = self.taken.len();
         let pauses: Vec<Pause> =
-            self.peripheral.pauses.iter().filter(|pause| pause.after == count).copied().collect();
+            self.peripheral.pauses.extract_if(.., |pause| pause.after == count).collect();
         for pause in pauses {
             let (bad, good) = match pause.line {
                 Line::Busy => (1, 0),

@@ -1,24 +1,22 @@
 //! The host's end of the simulated cable.
 
-use super::{Line, World};
+use super::{Cable, Line};
 use crate::port::{AckPin, DataBus};
 use core::convert::Infallible;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
-use std::cell::RefCell;
-use std::rc::Rc;
 
 /// Data1..Data8.
-pub struct DataLines(pub(super) Rc<RefCell<World>>);
+pub struct DataLines(pub(super) Cable);
 
 impl DataBus for DataLines {
     fn put(&mut self, byte: u8) {
-        self.0.borrow_mut().host(Line::Data, byte);
+        self.0.look().host(Line::Data, byte);
     }
 }
 
 /// A line the host drives.
-pub struct OutLine(pub(super) Rc<RefCell<World>>, pub(super) Line);
+pub struct OutLine(pub(super) Cable, pub(super) Line);
 
 impl ErrorType for OutLine {
     type Error = Infallible;
@@ -26,18 +24,18 @@ impl ErrorType for OutLine {
 
 impl OutputPin for OutLine {
     fn set_low(&mut self) -> Result<(), Infallible> {
-        self.0.borrow_mut().host(self.1, 0);
+        self.0.look().host(self.1, 0);
         Ok(())
     }
 
     fn set_high(&mut self) -> Result<(), Infallible> {
-        self.0.borrow_mut().host(self.1, 1);
+        self.0.look().host(self.1, 1);
         Ok(())
     }
 }
 
 /// A line the printer drives.
-pub struct InLine(pub(super) Rc<RefCell<World>>, pub(super) Line);
+pub struct InLine(pub(super) Cable, pub(super) Line);
 
 impl ErrorType for InLine {
     type Error = Infallible;
@@ -45,7 +43,7 @@ impl ErrorType for InLine {
 
 impl InputPin for InLine {
     fn is_high(&mut self) -> Result<bool, Infallible> {
-        let mut world = self.0.borrow_mut();
+        let mut world = self.0.look();
         world.pass(8);
         Ok(world.level(self.1) == 1)
     }
@@ -56,31 +54,31 @@ impl InputPin for InLine {
 }
 
 /// nAck, with an edge latch.
-pub struct AckLine(pub(super) Rc<RefCell<World>>);
+pub struct AckLine(pub(super) Cable);
 
 impl AckPin for AckLine {
     fn is_high(&mut self) -> bool {
-        let mut world = self.0.borrow_mut();
+        let mut world = self.0.look();
         world.pass(8);
         world.level(Line::Ack) == 1
     }
 
     fn arm(&mut self) {
-        self.0.borrow_mut().ack_latch = false;
+        self.0.look().ack_latch = false;
     }
 
     fn fell(&mut self) -> bool {
-        let mut world = self.0.borrow_mut();
+        let mut world = self.0.look();
         world.pass(8);
         world.ack_latch
     }
 }
 
 /// The clock.
-pub struct DelayLine(pub(super) Rc<RefCell<World>>);
+pub struct DelayLine(pub(super) Cable);
 
 impl DelayNs for DelayLine {
     fn delay_ns(&mut self, ns: u32) {
-        self.0.borrow_mut().pass(u64::from(ns));
+        self.0.look().pass(u64::from(ns));
     }
 }

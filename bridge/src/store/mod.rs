@@ -12,7 +12,7 @@
 //!   cut short may leave any mixture of old and new bits, and none of them is a head that was there before.
 //! * **Wear.** Sectors are taken in turn, each is erased once for each use, and none is ever copied. 100,000 uses of each are what
 //!   makers of such chips promise.
-//! * **What the printer is owed** is written in two sectors of their own ([`Standing`]).
+//! * **Which sheet the printer is in** is written in two sectors of their own ([`Record`]).
 //!
 //! Nothing but the list of jobs is in memory. What it says is found again at the start by reading every head.
 //!
@@ -20,14 +20,14 @@
 //! (400 at most), a page under 1 ms. Limits: [`MOST`] jobs; a name of [`NAME_MAX`] bytes.
 //! Why no library does this: `docs/decisions/print-alone.md`.
 
+mod diary;
 mod flash;
-mod printer_log;
 
+pub use diary::{End, Record};
 pub use flash::{Flash, NoFlash, PAGE, SECTOR};
-pub use printer_log::{Note, Standing};
 
+use diary::Diary;
 use heapless::{String, Vec};
-use printer_log::PrinterLog;
 use protocol::link::frame::checksum;
 use protocol::link::message::{JobKind, NAME_MAX};
 
@@ -129,8 +129,8 @@ pub struct Worn;
 /// The store.
 pub struct Store<F> {
     flash: F,
-    printer_log: PrinterLog,
-    /// Sectors for jobs, behind those of the printer log.
+    diary: Diary,
+    /// Sectors for jobs, behind those of the diary.
     sectors: u32,
     /// The oldest first.
     jobs: Vec<Stored, MOST>,
@@ -144,10 +144,10 @@ pub struct Store<F> {
 impl<F: Flash> Store<F> {
     /// Finds what is in the flash. Writes nothing.
     pub fn open(flash: F) -> Self {
-        let sectors = (flash.size() / SECTOR).saturating_sub(printer_log::SECTORS);
-        let printer_log = PrinterLog::open(&flash);
+        let sectors = (flash.size() / SECTOR).saturating_sub(diary::SECTORS);
+        let diary = Diary::open(&flash);
         let mut store =
-            Store { flash, printer_log, sectors, jobs: Vec::new(), sequence: 1, next: 0, draft: None };
+            Store { flash, diary, sectors, jobs: Vec::new(), sequence: 1, next: 0, draft: None };
         for sector in 0..sectors {
             let Some(head) = store.head(sector) else { continue };
             if head.sequence >= store.sequence {
@@ -307,16 +307,32 @@ impl<F: Flash> Store<F> {
         Next::Bytes(count)
     }
 
-    /// What was last written of the printer.
-    pub fn note(&self) -> Note {
-        self.printer_log.last()
+    /// Whether there is room for a diary.
+    pub fn keeps_diary(&self) -> bool {
+        self.sectors > 0
     }
 
-    /// Writes where the printer stands, if that is news. Without an area nothing is written.
-    pub fn write_note(&mut self, note: Note) {
-        if self.sectors > 0 {
-            self.printer_log.write(&mut self.flash, note);
+    /// What the diary says last; nothing where it says nothing that is known.
+    pub fn noted(&self) -> Option<Record> {
+        self.diary.last().filter(|_| self.keeps_diary())
+    }
+
+    /// Notes that this job begins, unless that was noted last. `stored`: what it was stored as, or 0.
+    pub fn note_begin(&mut self, job: u32, stored: u32) {
+        let is_noted = self.noted() == Some(Record { job, stored, end: None });
+        if self.keeps_diary() && !is_noted {
+            self.diary.begin(&mut self.flash, job, stored);
         }
+    }
+
+    /// Notes that the printer stands between two jobs, if that is news.
+    pub fn note_end(&mut self, end: End) {
+        self.diary.end(&mut self.flash, end);
+    }
+
+    /// Makes room for what the diary notes next; whether there was something to do.
+    pub fn make_room(&mut self) -> bool {
+        self.keeps_diary() && self.diary.erase_ahead(&mut self.flash)
     }
 
     /// Takes the next free sector for the draft.
@@ -325,7 +341,7 @@ impl<F: Flash> Store<F> {
         let free = (0..self.sectors).map(|step| (self.next + step) % self.sectors);
         let sector = free.into_iter().find(|&sector| !self.is_used(sector, draft)).ok_or(Worn)?;
         self.blot(sector);
-        self.flash.erase(printer_log::SECTORS + sector);
+        self.flash.erase(diary::SECTORS + sector);
         if place == 0 {
             draft.stored.sector = sector;
         }
@@ -413,7 +429,7 @@ fn page_sum(page: &[u8; PAGE as usize], stored: &Stored, at: u32) -> u32 {
 }
 
 fn address(sector: u32) -> u32 {
-    (printer_log::SECTORS + sector) * SECTOR
+    (diary::SECTORS + sector) * SECTOR
 }
 
 fn seal_address(sector: u32) -> u32 {

@@ -1,15 +1,16 @@
 //! Storing, and printing with no host, while the supply goes anywhere. What crosses the port is parsed: nothing is lost but the sheet
 //! in the rollers, nothing is printed twice or behind a part of something else, and the store holds the old or the new state.
 
-use bridge::alone::Alone;
+use bridge::alone::{Alone, SILENCE_US};
 use bridge::button::Press;
 use bridge::engine::{Engine, Outcome, Task};
+use bridge::standing::Standing;
 use bridge::store::{Next, NoFlash, PAGE_DATA};
 use model::flash::ModelFlash;
 use model::{Board, IDENTITY, Job, framed, is_a_whole_job, seeded};
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
-    ALONE, DATA_MAX, DefectKind, Fault, JobKind, JobState, Lines, PastJob, Progress, Refusal, StoredJob,
+    ALONE, DATA_MAX, DefectKind, Fault, JobKind, JobState, LOCAL, Lines, PastJob, Progress, Refusal, StoredJob,
     ToBridge, ToHost,
 };
 use rand::RngExt;
@@ -34,6 +35,11 @@ impl<'m> Bridge<'m> {
         let mut engine = Engine::resume(board.memory(), IDENTITY, before);
         let alone = Alone::open(flash.clone(), &mut engine, true);
         Bridge { engine, alone, reader: Reader::new(), said: Vec::new() }
+    }
+
+    /// The store has a turn, and time stands still.
+    fn poll(&mut self) -> bool {
+        self.alone.poll(&mut self.engine, 0)
     }
 
     fn tell(&mut self, message: ToBridge<'_>) {
@@ -184,7 +190,7 @@ fn a_thousand_cuts_cost_nothing_but_the_sheet_in_the_rollers() {
                 let cancel_at = random.random_bool(0.15).then(|| random.random_range(0..4000));
                 let mut is_cancelled = false;
                 loop {
-                    let more = bridge.alone.poll(&mut bridge.engine);
+                    let more = bridge.poll();
                     moments -= 1;
                     if flash.is_off() || moments == 0 {
                         break 'deeds;
@@ -246,7 +252,7 @@ fn a_thousand_cuts_cost_nothing_but_the_sheet_in_the_rollers() {
                     }
                     printer.since.clear();
                     // The note that it has ended.
-                    while bridge.alone.poll(&mut bridge.engine) {}
+                    while bridge.poll() {}
                     if flash.is_off() {
                         break 'deeds;
                     }
@@ -272,21 +278,20 @@ fn a_thousand_cuts_cost_nothing_but_the_sheet_in_the_rollers() {
                 }
                 _ => {}
             }
-            if !half.is_empty() && matches!(deed, Deed::Button | Deed::Command) {
+            if !half.is_empty() {
                 assert_eq!(again.progress().state, JobState::Lost, "{deed:?}");
-                assert!(again.engine.owes_reset() && again.engine.output().is_empty());
+                assert!(matches!(again.engine.standing(), Standing::Unknown { .. }));
             }
             printer.since = half;
             let lost = printer.lost.len();
-            if deed == Deed::Link && !printer.since.is_empty() {
-                // The host of that job remembers it, and has the printer reset.
-                again.tell(ToBridge::Initialise { request: 7 });
-            }
+            // Whatever comes next comes behind a reset.
+            again.engine.local(b"plain text");
+            again.engine.local_end();
             for _ in 0..4 {
-                while again.alone.poll(&mut again.engine) {}
+                while again.poll() | again.engine.work() {}
                 printer.serve(&mut again.engine, 1000);
             }
-            assert!(printer.since.is_empty(), "{deed:?}: no part of a sheet is left behind");
+            assert_eq!(std::mem::take(&mut printer.since), b"plain text", "{deed:?}: into a part of a sheet");
             sheets_lost += printer.lost.len() - lost;
         }
     }
@@ -308,7 +313,7 @@ fn print_once(data: &[u8], kind: JobKind) -> Vec<u8> {
 /// Polls until nothing moves any more, the printer taking everything.
 fn settle(bridge: &mut Bridge<'_>, printer: &mut Printer) {
     for _ in 0..200 {
-        while bridge.alone.poll(&mut bridge.engine) | bridge.engine.work() {}
+        while bridge.poll() | bridge.engine.work() {}
         printer.serve(&mut bridge.engine, usize::MAX);
     }
 }
@@ -316,10 +321,10 @@ fn settle(bridge: &mut Bridge<'_>, printer: &mut Printer) {
 fn store(bridge: &mut Bridge<'_>, printer: &mut Printer, job: &Job) {
     let length = job.data.len() as u32;
     bridge.tell(ToBridge::Store { job: job.id, kind: job.kind, length, name: &format!("sheet {}", job.id) });
-    bridge.alone.poll(&mut bridge.engine);
+    bridge.poll();
     while bridge.engine.open_job() == Some(job.id) {
         bridge.send(job.id, &job.data, DATA_MAX);
-        while bridge.alone.poll(&mut bridge.engine) {}
+        while bridge.poll() {}
     }
     settle(bridge, printer);
     assert_eq!(bridge.progress().state, JobState::Stored);
@@ -340,7 +345,7 @@ fn the_host_stores_lists_prints_and_deletes() {
     let ask = |bridge: &mut Bridge<'_>, message: ToBridge<'_>| {
         bridge.hear();
         bridge.tell(message);
-        while bridge.alone.poll(&mut bridge.engine) {}
+        while bridge.poll() {}
         bridge.hear()
     };
     fn told(count: u8, room: u32, total: u32, job: Option<StoredJob<'_>>) -> String {
@@ -403,7 +408,7 @@ fn a_job_that_is_being_printed_is_neither_deleted_nor_printed_again_nor_joined_b
     let [first, second] = jobs(&mut random);
     store(&mut bridge, &mut printer, &first);
     bridge.engine.press(Press::Short);
-    bridge.alone.poll(&mut bridge.engine);
+    bridge.poll();
     for message in [
         ToBridge::DeleteStored { request: 1, stored: first.id },
         ToBridge::PrintStored { job: 9, stored: first.id },
@@ -414,7 +419,7 @@ fn a_job_that_is_being_printed_is_neither_deleted_nor_printed_again_nor_joined_b
     ] {
         bridge.hear();
         bridge.tell(message);
-        bridge.alone.poll(&mut bridge.engine);
+        bridge.poll();
         let said = bridge.hear().join("\n");
         let refused = said.contains("JobOpen");
         assert!(refused || matches!(message, ToBridge::Data { .. }), "{message:?}: {said}");
@@ -441,7 +446,7 @@ fn the_button_starts_holds_goes_on_and_cancels() {
     store(&mut bridge, &mut printer, &second);
     bridge.engine.press(Press::Short);
     while printer.since.len() < second.expected.len() / 2 {
-        while bridge.alone.poll(&mut bridge.engine) | bridge.engine.work() {}
+        while bridge.poll() | bridge.engine.work() {}
         printer.serve(&mut bridge.engine, 100);
     }
     bridge.engine.press(Press::Short);
@@ -456,7 +461,7 @@ fn the_button_starts_holds_goes_on_and_cancels() {
     // Again, and cancelled while it is held: a whole job for the printer.
     bridge.engine.press(Press::Short);
     while printer.since.len() < second.expected.len() / 2 {
-        while bridge.alone.poll(&mut bridge.engine) | bridge.engine.work() {}
+        while bridge.poll() | bridge.engine.work() {}
         printer.serve(&mut bridge.engine, 100);
     }
     bridge.engine.press(Press::Short);
@@ -477,26 +482,26 @@ fn a_reset_that_is_owed_outlives_the_supply_and_comes_before_anything_else() {
     bridge.tell(ToBridge::Begin { job: 7, kind: first.kind, length: first.data.len() as u32 });
     while printer.since.is_empty() {
         bridge.send(7, &first.data, 500);
-        while bridge.engine.work() {}
+        while bridge.poll() | bridge.engine.work() {}
         printer.serve(&mut bridge.engine, 100);
     }
     bridge.engine.port(Lines(0), Some(Fault::PowerOff));
     assert_eq!(bridge.progress().state, JobState::Lost);
-    while bridge.alone.poll(&mut bridge.engine) {}
+    while bridge.poll() {}
     drop(bridge);
     let mut bridge = Bridge::start(&mut board, &flash);
-    assert!(bridge.engine.owes_reset());
+    assert_eq!(bridge.engine.standing(), Standing::Unknown { job: 7, due: false });
     bridge.tell(ToBridge::Begin { job: 8, kind: second.kind, length: second.data.len() as u32 });
     while bridge.engine.open_job() == Some(8) {
         bridge.send(8, &second.data, 500);
-        while bridge.engine.work() {}
+        while bridge.poll() | bridge.engine.work() {}
         printer.serve(&mut bridge.engine, 100);
-        bridge.alone.poll(&mut bridge.engine);
     }
-    assert_eq!((printer.resets, printer.since), (1, second.expected));
-    while bridge.alone.poll(&mut bridge.engine) {}
+    // Before the first one, since nothing was known, and behind its loss.
+    assert_eq!((printer.resets, printer.since), (2, second.expected));
+    while bridge.poll() {}
     drop(bridge);
-    assert!(!Bridge::start(&mut board, &flash).engine.owes_reset(), "the reset was done");
+    assert_eq!(Bridge::start(&mut board, &flash).engine.standing(), Standing::AtRest, "the reset was done");
 }
 
 #[test]
@@ -531,9 +536,9 @@ fn flash_that_is_worn_out_refuses_the_job_and_says_why() {
     let mut bridge = Bridge::start(&mut board, &flash);
     flash.wear_out(2 * 4096);
     bridge.tell(ToBridge::Store { job: 5, kind: JobKind::Raw, length: 500, name: "x" });
-    bridge.alone.poll(&mut bridge.engine);
+    bridge.poll();
     bridge.send(5, &[1; 500], 500);
-    while bridge.alone.poll(&mut bridge.engine) {}
+    while bridge.poll() {}
     let state = bridge.progress().state;
     assert!(matches!(state, JobState::Broken(defect) if defect.what == DefectKind::Flash), "{state:?}");
 }
@@ -546,7 +551,7 @@ fn a_board_without_an_area_says_so() {
     let (mut reader, mut buffer) = (Reader::new(), [0; MAX]);
     let list = framed(&ToBridge::ListStored { request: 3, index: 0 });
     engine.receive(&mut reader, &list);
-    while alone.poll(&mut engine) {}
+    while alone.poll(&mut engine, 0) {}
     let length = engine.transmit(&mut buffer);
     let mut reader = Reader::new();
     let Read::Message(bytes, []) = reader.read(&buffer[..length]) else { panic!("not a frame") };
@@ -586,7 +591,7 @@ fn a_plain_job_that_the_loss_of_the_supply_cuts_in_two_leaves_a_note() {
     }
     let mut other = Board::new(2048, 4096);
     let again = Bridge::start(&mut other, &flash);
-    assert!(again.engine.owes_reset(), "whatever comes next");
+    assert!(matches!(again.engine.standing(), Standing::Unknown { job: LOCAL, .. }), "whatever comes next");
     // One that has come to its end leaves none.
     for piece in stream[stream.len() / 2..].chunks(64) {
         bridge.engine.local(piece);
@@ -594,5 +599,42 @@ fn a_plain_job_that_the_loss_of_the_supply_cuts_in_two_leaves_a_note() {
     }
     assert_eq!(bridge.progress().state, JobState::Done);
     let mut other = Board::new(2048, 4096);
-    assert!(!Bridge::start(&mut other, &flash).engine.owes_reset());
+    assert_eq!(Bridge::start(&mut other, &flash).engine.standing(), Standing::AtRest);
+}
+
+/// A store cannot be resumed, and all others wait for it.
+#[test]
+fn a_store_whose_host_says_nothing_of_it_for_thirty_seconds_is_dropped() {
+    let mut random = seeded(33);
+    let (mut board, flash) = (Board::new(2048, 4096), ModelFlash::new(60, &mut random));
+    let (mut bridge, mut printer) = (Bridge::start(&mut board, &flash), Printer::default());
+    let [first, _] = jobs(&mut random);
+    let store = || ToBridge::Store { job: 5, kind: first.kind, length: first.data.len() as u32, name: "x" };
+    let mut now = 7;
+    bridge.tell(store());
+    bridge.alone.poll(&mut bridge.engine, now);
+    // A host that is slow, and one that has nothing new to say, live.
+    for round in 0..6 {
+        now += SILENCE_US - 1;
+        bridge.alone.poll(&mut bridge.engine, now);
+        assert_eq!(bridge.progress().state, JobState::Storing, "round {round}");
+        match round % 2 {
+            0 => bridge.send(5, &first.data, 50),
+            _ => bridge.tell(store()),
+        }
+        // Another one's words do not count.
+        bridge.tell(ToBridge::Begin { job: 9, kind: JobKind::Raw, length: 9 });
+        bridge.alone.poll(&mut bridge.engine, now);
+    }
+    for at in [now + SILENCE_US / 2, now + SILENCE_US - 1] {
+        bridge.tell(ToBridge::Begin { job: 9, kind: JobKind::Raw, length: 9 });
+        bridge.alone.poll(&mut bridge.engine, at);
+        assert_eq!(bridge.engine.local(b"text"), 0, "everybody waits");
+    }
+    bridge.alone.poll(&mut bridge.engine, now + SILENCE_US);
+    assert_eq!((bridge.progress().state, bridge.engine.open_job()), (JobState::Cancelled, None));
+    assert_eq!(bridge.engine.local(b"text"), 4);
+    bridge.engine.local_end();
+    settle(&mut bridge, &mut printer);
+    assert_eq!((&printer.since[..], bridge.stored().len()), (&b"text"[..], 0));
 }

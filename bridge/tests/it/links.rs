@@ -3,7 +3,7 @@
 use bridge::engine::Engine;
 use bridge::links::{Links, Way};
 use bridge::turn::{self, Turn};
-use model::{IDENTITY, framed, memory, seeded};
+use model::{IDENTITY, framed, memory, rested, seeded};
 use protocol::link::frame::MAX;
 use protocol::link::message::{JobKind, JobState, ToBridge, VERSION};
 use std::cell::Cell;
@@ -11,7 +11,7 @@ use std::cell::Cell;
 const HELLO: ToBridge<'_> = ToBridge::Hello { version: VERSION, schema: 0 };
 
 fn engine() -> Engine<'static> {
-    Engine::new(memory(2048, 4096, 40_000), IDENTITY)
+    rested(memory(2048, 4096, 40_000), IDENTITY)
 }
 
 fn answers(engine: &mut Engine<'_>) -> usize {
@@ -97,7 +97,7 @@ fn a_turn_of_work_ends_with_its_time_or_with_the_work() {
     let streams = planes.streams();
     let mut engine = engine();
     let (mut reader, now, slices) = (protocol::link::frame::Reader::new(), Cell::new(0u64), Cell::new(0));
-    assert_eq!(turn::work(&mut engine, || now.get()), Turn { more: false, wake_port: false });
+    assert_eq!(turn::work(&mut engine, || now.get()), Turn { more: false, wake_port: false, wake_store: false });
     let length = streams.len() as u32;
     engine.receive(&mut reader, &framed(&ToBridge::Begin { job: 3, kind: JobKind::Streams, length }));
     let bytes = &streams[..streams.len().min(900)];

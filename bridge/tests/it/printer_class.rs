@@ -2,7 +2,7 @@
 
 use bridge::engine::{Engine, LOCAL};
 use bridge::printer_class::{End, Intake, Next, PACKET};
-use model::{IDENTITY, Job, framed, is_a_whole_job, memory, seeded};
+use model::{IDENTITY, Job, framed, is_a_whole_job, memory, rested, seeded};
 use proptest::prelude::*;
 use protocol::link::frame::Reader;
 use protocol::link::message::{Fault, JobKind, JobState, Lines, ToBridge};
@@ -24,10 +24,7 @@ impl Rig {
     fn new() -> Rig {
         let mut intake = Intake::new();
         intake.connect(0);
-        let mut engine = Engine::new(memory(2048, 4096, 40_000), IDENTITY);
-        // The printer has just been switched on, so it needs no reset.
-        engine.port(Lines(0), Some(Fault::PowerOff));
-        engine.port(Lines::IDLE, None);
+        let engine = rested(memory(2048, 4096, 40_000), IDENTITY);
         Rig { engine, intake, now: 0, printed: Vec::new(), pace: 400 }
     }
 

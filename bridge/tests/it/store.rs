@@ -1,6 +1,6 @@
 //! The store on flash whose supply goes anywhere: what was there before, or what is new, and nothing between.
 
-use bridge::store::{Next, Note, PAGE_DATA, SECTOR, Standing, Store, Worn};
+use bridge::store::{Next, PAGE_DATA, SECTOR, Store, Worn};
 use model::flash::ModelFlash;
 use model::seeded;
 use proptest::prelude::*;
@@ -120,35 +120,6 @@ fn a_thousand_cuts_of_the_supply_leave_the_old_or_the_new_state() {
         }
     }
     assert!(whole > 8 && half > 300 && gone > 20 && left > 8, "{whole} {half} {gone} {left}");
-}
-
-#[test]
-fn the_notes_on_the_printer_survive_cuts_too() {
-    let mut random = seeded(12);
-    for _ in 0..60 {
-        let flash = ModelFlash::new(4, &mut random);
-        let mut last = Note { standing: Standing::Clear, job: 0, stored: 0 };
-        for _ in 0..6 {
-            let mut store = Store::open(flash.clone());
-            assert_eq!(store.note(), last);
-            flash.cut_after(random.random_range(0..300));
-            while !flash.is_off() {
-                let standing =
-                    [Standing::Clear, Standing::ResetOwed, Standing::Printing][random.random_range(0..3)];
-                let note = Note { standing, job: random.random_range(1..9), stored: random.random() };
-                store.write_note(note);
-                if flash.is_off() {
-                    flash.power_up();
-                    let found = Store::open(flash.clone()).note();
-                    assert!(found == last || found == note, "{last:?}, {note:?}: {found:?}");
-                    last = found;
-                    break;
-                }
-                last = note;
-                assert_eq!(store.note(), last);
-            }
-        }
-    }
 }
 
 #[test]

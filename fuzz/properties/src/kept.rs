@@ -65,7 +65,7 @@ fn run(engine: &mut Engine<'_>, checkpoints: &mut CheckpointStore<Retained>, alo
     for _ in 0..200 {
         engine.port(Lines::IDLE, None);
         bridge::turn::work(engine, || 0);
-        alone.poll(engine);
+        alone.poll(engine, 0);
         if engine.task().is_some() {
             engine.done(Outcome::Done);
         }

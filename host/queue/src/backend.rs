@@ -300,7 +300,7 @@ impl Backend<'_> {
                 self.delivery.queue(&journal, &packed, address)
             }
         }
-        .and_then(|queued: OpenJob| self.delivery.send(&journal, queued, address, None, false));
+        .and_then(|queued: OpenJob| self.delivery.send(&journal, queued, address, false, false));
         match sent {
             Ok(ended) => {
                 let sent = self.judge(&ended, folder)?;
@@ -482,7 +482,7 @@ impl Backend<'_> {
                 continue;
             };
             self.messages.debug(&format!("ending job {:08x}, which was left open", entry.record.job));
-            match self.delivery.send(&journal, left, address, None, true) {
+            match self.delivery.send(&journal, left, address, false, true) {
                 Ok(_) => {}
                 Err(Failure::Left | Failure::Session(SessionError::OtherBridge { .. })) => all = false,
                 Err(_) if self.system.stops() => all = false,

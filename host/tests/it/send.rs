@@ -3,7 +3,7 @@
 use std::fs;
 use std::process::{Command, Output, Stdio};
 
-use device::printers::{Printer, Printers};
+use device::printers::Printers;
 use device::transit::journal::{Journal, NewJob};
 use observe::Silent;
 use press::job::stream::write_job;
@@ -181,7 +181,7 @@ fn a_device_that_may_hold_part_of_a_job_gets_nothing_until_its_switch_was_used()
     let (path, mut port) = (bench.folder.path().join("port"), bench.device());
     let printers = Printers::at(&bench.folder.path().join("printers")).unwrap();
     // As it is left by a process that was killed.
-    printers.begin(&Printer::Device(path), "raw-1-1", None).unwrap();
+    printers.begin(&path, "raw-1-1").unwrap();
     let said = bench.says(1, "send job.rgl --to raw:port");
     assert!(said.contains("not sent") && said.contains("bridge reset --by-hand"), "{said}");
     assert!(port.taken().is_empty(), "something was sent");

@@ -1,6 +1,6 @@
 //! The whole bridge in virtual time: frames go in at one end, a printer stands at the other.
 
-use crate::{Board, IDENTITY, framed};
+use crate::{Board, IDENTITY, framed, rested};
 use bridge::driver::Driver;
 use bridge::engine::{Checkpoint, Engine};
 use bridge::port::Port;
@@ -33,16 +33,26 @@ pub struct Bench<'m> {
 }
 
 impl<'m> Bench<'m> {
+    /// A bridge whose diary says that the printer stands between two jobs.
     pub fn new(board: &'m mut Board, peripheral: Peripheral) -> Self {
         Self::on(&SimulatedPort::new(peripheral), board, None)
+    }
+
+    /// A bridge of which nobody knows what it did before.
+    pub fn unaware(board: &'m mut Board, peripheral: Peripheral) -> Self {
+        Self::with(&SimulatedPort::new(peripheral), Engine::new(board.memory(), IDENTITY))
     }
 
     /// A bridge that starts at this cable.
     pub fn on(cable: &SimulatedPort, board: &'m mut Board, checkpoint: Option<Checkpoint>) -> Self {
         let engine = match checkpoint {
             Some(checkpoint) => Engine::resume(board.memory(), IDENTITY, checkpoint),
-            None => Engine::new(board.memory(), IDENTITY),
+            None => rested(board.memory(), IDENTITY),
         };
+        Self::with(cable, engine)
+    }
+
+    fn with(cable: &SimulatedPort, engine: Engine<'m>) -> Self {
         let (pins, delay) = cable.pins();
         let board = SimulatedBoard::new(cable);
         let driver = Driver::new(board.clone(), Port::new(pins, delay));

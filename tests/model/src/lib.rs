@@ -26,6 +26,13 @@ pub fn memory(data: usize, output: usize, band: usize) -> Memory<'static> {
     Memory { data: leak(data), output: leak(output), band: leak(band), decoder }
 }
 
+/// An engine whose diary says that the printer stands between two jobs.
+pub fn rested<'m>(memory: Memory<'m>, identity: Identity) -> Engine<'m> {
+    let mut engine = Engine::new(memory, identity);
+    engine.wake(true, 0);
+    engine
+}
+
 /// The memory of one engine after the other.
 pub struct Board {
     data: Vec<u8>,
@@ -358,7 +365,7 @@ pub fn run(job: &Job, mischief: &Mischief, cancel_at: Option<usize>, random: &mu
         let mut board = Board::new(sizes.0, sizes.1);
         let mut engine = match checkpoint {
             Some(checkpoint) => Engine::resume(board.memory(), IDENTITY, checkpoint),
-            None => Engine::new(board.memory(), IDENTITY),
+            None => rested(board.memory(), IDENTITY),
         };
         let mut reader = Reader::new();
         let mut faulty = 0u32;

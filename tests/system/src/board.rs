@@ -1,11 +1,17 @@
-//! The board: engine, store, ways to the host, memory that outlives a reset.
+//! The board: engine, store, ways to the host, and the driver at the simulated cable, with memory that outlives a reset.
 
 use bridge::alone::Alone;
 use bridge::checkpoint::{CheckpointStore, MARKS, Memory as Slots, PAST_SLOT, SLOT};
+use bridge::driver::{Clock, Driver, Event, Sender};
 use bridge::engine::{Checkpoint, Engine, Identity, Memory};
 use bridge::links::Links;
-use bridge::printer_class::Intake;
+use bridge::port::{Port, Timing};
+use bridge::printer_class::{DeviceId, Intake};
+use bridge::simulation::{
+    AckLine, DataLines, DelayLine, InLine, OutLine, SimulatedBoard, SimulatedPort,
+};
 use model::flash::ModelFlash;
+use protocol::link::message::Lines;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -68,6 +74,102 @@ impl Slots for Retained {
     }
 }
 
+/// The board at the cable: the sender's bytes leave their marks in the memory that outlives a reset. Clones are the same.
+#[derive(Clone)]
+struct AtCable {
+    board: SimulatedBoard,
+    kept: Arc<Mutex<(CheckpointStore<Retained>, u32)>>,
+}
+
+impl AtCable {
+    fn kept(&self) -> MutexGuard<'_, (CheckpointStore<Retained>, u32)> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Makes the marks of what has crossed, but for the last `unmarked`.
+    fn mark_crossed(&self, unmarked: u32) {
+        let (checkpoints, marked) = &mut *self.kept();
+        let crossed = self.board.marks().saturating_sub(unmarked);
+        (*marked..crossed).for_each(|at| checkpoints.mark(at as usize));
+        *marked = crossed.max(*marked);
+    }
+}
+
+impl Clock for AtCable {
+    fn now_us(&self) -> u64 {
+        self.board.now_us()
+    }
+}
+
+impl Sender for AtCable {
+    fn set_timing(&mut self, timing: &Timing) {
+        self.board.set_timing(timing);
+    }
+
+    fn connect(&mut self) {
+        self.board.connect();
+    }
+
+    fn disconnect(&mut self) {
+        self.board.disconnect();
+    }
+
+    fn has_room(&self) -> bool {
+        self.board.has_room()
+    }
+
+    fn give(&mut self, bytes: &[u8]) -> usize {
+        self.board.give(bytes)
+    }
+
+    fn in_flight(&self) -> usize {
+        self.board.in_flight()
+    }
+
+    fn sent(&mut self) -> usize {
+        self.board.sent()
+    }
+
+    fn stop(&mut self) -> usize {
+        self.board.stop()
+    }
+}
+
+impl bridge::driver::Retained for AtCable {
+    fn mark(&mut self) {
+        self.board.mark();
+    }
+
+    fn store(&mut self, checkpoint: Checkpoint) {
+        self.mark_crossed(0);
+        let crossed = self.board.marks();
+        self.board.store(checkpoint);
+        // Those that the checkpoint does not cover stay.
+        let left = self.board.marks();
+        let (checkpoints, marked) = &mut *self.kept();
+        checkpoints.store(checkpoint, checkpoints.place() + (crossed - left) as usize);
+        *marked = left;
+    }
+}
+
+impl bridge::driver::Board for AtCable {
+    fn lines(&mut self) -> Lines {
+        bridge::driver::Board::lines(&mut self.board)
+    }
+
+    fn enable(&mut self, on: bool) {
+        self.board.enable(on);
+    }
+
+    fn start_boot_loader(&mut self) {
+        self.board.start_boot_loader();
+    }
+
+    fn log(&mut self, event: Event) {
+        self.board.log(event);
+    }
+}
+
 /// A board from one start to the next.
 pub struct Board {
     /// The engine.
@@ -78,7 +180,9 @@ pub struct Board {
     pub links: Links,
     /// The plain printer interface.
     pub intake: Intake,
-    checkpoints: CheckpointStore<Retained>,
+    driver: Driver<AtCable, DataLines, OutLine, InLine, AckLine, DelayLine>,
+    at_cable: AtCable,
+    id: DeviceId,
 }
 
 /// Memory for an engine, which goes from one start to the next.
@@ -87,10 +191,11 @@ pub fn memory(data: usize, output: usize) -> Memory<'static> {
 }
 
 impl Board {
-    /// The board starts; `known` says that its memory is what an earlier start has left there, `from_outside` that it was not
-    /// reset by its own watchdog.
+    /// The board starts at this cable; `known` says that its memory is what an earlier start has left there, `from_outside` that it was
+    /// not reset by its own watchdog.
     pub fn start(
         memory: Memory<'static>,
+        cable: &SimulatedPort,
         retained: Retained,
         flash: &ModelFlash,
         boot: u32,
@@ -106,25 +211,24 @@ impl Board {
             None => Engine::new(memory, identity),
         };
         let alone = Alone::open(flash.clone(), &mut engine, checkpoint.is_some());
-        Board { engine, alone, links: Links::new(), intake: Intake::new(), checkpoints }
+        let at_cable =
+            AtCable { board: SimulatedBoard::new(cable), kept: Arc::new(Mutex::new((checkpoints, 0))) };
+        let (pins, delay) = cable.pins();
+        let driver = Driver::new(at_cable.clone(), Port::new(pins, delay));
+        let (links, intake, id) = (Links::new(), Intake::new(), DeviceId::new());
+        Board { engine, alone, links, intake, driver, at_cable, id }
     }
 
-    /// The board stops: its memory.
-    pub fn stop(self) -> Memory<'static> {
+    /// The driver looks; for how many µs there is nothing to do then.
+    pub fn poll(&mut self) -> u32 {
+        self.driver.poll(&mut self.engine, &mut self.id)
+    }
+
+    /// The board stops: its memory. A byte whose strobe is under way comes to its end; all are marked but the last `unmarked`.
+    pub fn stop(self, unmarked: u32) -> Memory<'static> {
+        self.at_cable.board.halt();
+        self.at_cable.mark_crossed(unmarked);
+        let _ = self.at_cable.board.reset();
         self.engine.into_memory()
-    }
-
-    /// So many bytes cross the port; all are marked but the last `unmarked`. What the driver does before the first of them is done.
-    pub fn cross(&mut self, count: usize, unmarked: usize) {
-        self.checkpoints.store(self.engine.checkpoint(), self.checkpoints.place());
-        for sent in 0..count.saturating_sub(unmarked) {
-            self.checkpoints.mark(sent);
-        }
-    }
-
-    /// The driver has looked: what has crossed counts, and the checkpoint covers it.
-    pub fn settle(&mut self, count: usize) {
-        self.engine.consumed(count);
-        self.checkpoints.store(self.engine.checkpoint(), self.checkpoints.place() + count);
     }
 }

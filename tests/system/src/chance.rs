@@ -23,8 +23,8 @@ pub enum Kind {
     Cancel,
     /// A user leaves (Ctrl-C).
     Leave,
-    /// A user who may not open the bridge writes what he likes into the folder of notes.
-    Forge,
+    /// The printer takes half of the next question.
+    HalfAsked,
     /// A burst on the link is lost.
     Lose,
     /// It comes twice.
@@ -43,7 +43,7 @@ pub enum Kind {
     Run,
     /// The board loses its supply.
     Cut,
-    /// The printer is switched off, and on again.
+    /// The printer is switched off and on again, or its cable is pulled and put back.
     SwitchOff,
     /// The printer is out of paper for a while.
     PaperOut,
@@ -54,12 +54,12 @@ pub enum Kind {
 /// How often, of a million occasions, when nothing is drawn.
 const RATES: [(Kind, u32); 19] = [
     (Kind::Act, 30_000),
-    (Kind::ActToo, 1_000),
-    (Kind::Plain, 1_000),
-    (Kind::Press, 300),
-    (Kind::Cancel, 500),
+    (Kind::ActToo, 2_000),
+    (Kind::Plain, 3_000),
+    (Kind::Press, 900),
+    (Kind::Cancel, 2_000),
     (Kind::Leave, 300),
-    (Kind::Forge, 1_000),
+    (Kind::HalfAsked, 600),
     (Kind::Lose, 15_000),
     (Kind::Double, 10_000),
     (Kind::Flip, 10_000),
@@ -69,7 +69,7 @@ const RATES: [(Kind, u32); 19] = [
     (Kind::Watchdog, 400),
     (Kind::Run, 300),
     (Kind::Cut, 300),
-    (Kind::SwitchOff, 200),
+    (Kind::SwitchOff, 500),
     (Kind::PaperOut, 400),
     (Kind::Age, 300),
 ];

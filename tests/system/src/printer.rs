@@ -11,10 +11,8 @@ pub struct Printer {
     pub since: Vec<u8>,
     /// The job whose bytes these are, as the bridge numbers it.
     pub owner: u32,
-    /// It is without supply until then.
+    /// Its +5 V are absent at the port until then.
     pub off_until: u64,
-    /// It is out of paper until then.
-    pub paper_out_until: u64,
     /// From when until when it prints what has come whole.
     prints: (u64, u64),
     /// How long its status says idle behind a sheet, and for how long it then prints.
@@ -24,19 +22,19 @@ pub struct Printer {
 impl Printer {
     /// A printer between two jobs, with this lag.
     pub fn new(lag: (u64, u64)) -> Printer {
-        Printer { since: Vec::new(), owner: 0, off_until: 0, paper_out_until: 0, prints: (0, 0), lag }
+        Printer { since: Vec::new(), owner: 0, off_until: 0, prints: (0, 0), lag }
     }
 
-    /// Whether it waits for the rest of a sheet.
+    /// Whether it waits for the rest of a sheet, or of a question.
     pub fn holds_a_part(&self) -> bool {
         !self.since.is_empty() && !is_a_whole_job(&self.since)
     }
 
-    /// It was reset, or switched off: gives the part of a sheet that is lost with that.
-    pub fn reset(&mut self) -> Option<(u32, Vec<u8>)> {
+    /// It was reset, or switched off: the job that is lost with that, if it had a part of one.
+    pub fn reset(&mut self) -> Option<u32> {
         let part = self.holds_a_part();
-        let since = std::mem::take(&mut self.since);
-        part.then_some((self.owner, since))
+        self.since.clear();
+        part.then_some(self.owner)
     }
 
     /// A whole sheet has come: when it will be out.

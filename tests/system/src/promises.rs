@@ -1,4 +1,11 @@
-//! What is promised to users, each sentence with a name.
+//! What is promised to users, each sentence with a name, and how often each was put to the test.
+//!
+//! A promise that nothing endangers is kept by anything. So whoever lives in the world notes each moment in which a promise could
+//! have broken: which, by which door bytes were asked for, and where the board took the printer to stand. A run prints that table. A
+//! cell that cannot be reached has a reason ([`cannot`]).
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
 
 /// A promise, and where it is given.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -25,6 +32,22 @@ pub enum Promise {
     StoredIsWholeOrBroken,
 }
 
+impl Promise {
+    /// All of them.
+    pub const ALL: [Promise; 10] = [
+        Promise::NothingIntoAnotherSheet,
+        Promise::NothingTwice,
+        Promise::PrintedIsAtThePrinter,
+        Promise::LossIsTold,
+        Promise::HarmlessCostsNothing,
+        Promise::EndedSheetIsLegal,
+        Promise::NoQuestionInASheet,
+        Promise::OutIsOut,
+        Promise::EveryJobEnds,
+        Promise::StoredIsWholeOrBroken,
+    ];
+}
+
 /// A promise that was not kept.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Broken {
@@ -34,4 +57,153 @@ pub struct Broken {
     pub step: u64,
     /// What was found.
     pub found: String,
+}
+
+/// By which way bytes were asked for.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub enum Door {
+    /// A job of the program over the link.
+    Link,
+    /// A job of an operating system through the plain printer interface.
+    Plain,
+    /// A stored job that a program has printed.
+    Stored,
+    /// A stored job that the button has started.
+    Button,
+    /// A question to the printer.
+    Question,
+}
+
+impl Door {
+    /// All of them.
+    pub const ALL: [Door; 5] = [Door::Link, Door::Plain, Door::Stored, Door::Button, Door::Question];
+}
+
+/// Where the board took the printer to stand.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub enum State {
+    /// It did not know.
+    Unknown,
+    /// Between two jobs.
+    AtRest,
+    /// In a sheet.
+    InSheet,
+    /// The board was down.
+    Down,
+}
+
+impl State {
+    /// All of them.
+    pub const ALL: [State; 4] = [State::Unknown, State::AtRest, State::InSheet, State::Down];
+}
+
+/// How often each promise was endangered.
+#[derive(Clone, Default, Debug)]
+pub struct Table(BTreeMap<(Promise, Door, State), u64>);
+
+impl Table {
+    /// A promise could break now.
+    pub fn note(&mut self, promise: Promise, door: Door, state: State) {
+        *self.0.entry((promise, door, state)).or_default() += 1;
+    }
+
+    /// Adds another run's.
+    pub fn add(&mut self, other: &Table) {
+        for (key, count) in &other.0 {
+            *self.0.entry(*key).or_default() += count;
+        }
+    }
+
+    /// How often this was the case.
+    pub fn count(&self, promise: Promise, door: Door, state: State) -> u64 {
+        self.0.get(&(promise, door, state)).copied().unwrap_or(0)
+    }
+
+    /// How often a promise was endangered, whatever the door and the state.
+    pub fn total(&self, promise: Promise) -> u64 {
+        self.0.iter().filter(|((which, ..), _)| *which == promise).map(|(_, count)| count).sum()
+    }
+
+    /// Cells that were never reached and have no reason for it, and cells that were reached in spite of one.
+    pub fn gaps(&self) -> Vec<String> {
+        let mut gaps = Vec::new();
+        for promise in Promise::ALL {
+            for door in Door::ALL {
+                for state in State::ALL {
+                    let count = self.count(promise, door, state);
+                    match cannot(promise, door, state) {
+                        None if count == 0 => gaps.push(format!("{promise:?} by {door:?} in {state:?}: never")),
+                        Some(why) if count > 0 => {
+                            gaps.push(format!("{promise:?} by {door:?} in {state:?}: {count} times, though {why}"));
+                        }
+                        _ => {}
+                    }
+                }
+            }
+        }
+        gaps
+    }
+
+    /// The table as text: a row for each promise and door, a column for each state; `-` where there can be nothing.
+    pub fn text(&self) -> String {
+        let mut text = format!("{:<24} {:<9}", "endangered", "by");
+        for state in State::ALL {
+            let _ = write!(text, " {:>9}", format!("{state:?}"));
+        }
+        for promise in Promise::ALL {
+            for door in Door::ALL {
+                if State::ALL.iter().all(|&state| cannot(promise, door, state).is_some()) {
+                    continue;
+                }
+                let _ = write!(text, "\n{:<24} {:<9}", format!("{promise:?}"), format!("{door:?}"));
+                for state in State::ALL {
+                    let count = match cannot(promise, door, state) {
+                        Some(_) => "-".into(),
+                        None => self.count(promise, door, state).to_string(),
+                    };
+                    let _ = write!(text, " {count:>9}");
+                }
+            }
+        }
+        text
+    }
+}
+
+/// Why a promise cannot be endangered by this door in this state, if it cannot.
+pub fn cannot(promise: Promise, door: Door, state: State) -> Option<&'static str> {
+    use Promise::*;
+    match (promise, door, state) {
+        (NothingIntoAnotherSheet, _, State::AtRest | State::InSheet) => {
+            Some("the board would take a printer with a part of a sheet to have none, or its own")
+        }
+        (NothingIntoAnotherSheet, _, State::Down) => Some("nobody asks a board that is down"),
+        (NothingTwice, Door::Plain | Door::Button | Door::Question, _) => Some("such a job has no number of its own"),
+        (NothingTwice, _, State::Down) => Some("nobody asks a board that is down"),
+        (PrintedIsAtThePrinter, Door::Plain | Door::Button | Door::Question, _) => {
+            Some("nobody is told how such a job has ended")
+        }
+        (PrintedIsAtThePrinter, _, State::Down) => Some("a board that is down tells nothing"),
+        (LossIsTold, Door::Plain | Door::Button | Door::Question, _) => Some("nobody is told how such a job has ended"),
+        (LossIsTold, _, State::Down) => Some("a board that is down tells nothing"),
+        (HarmlessCostsNothing, Door::Plain | Door::Button | Door::Question, _) => {
+            Some("nobody is told how such a job has ended")
+        }
+        (HarmlessCostsNothing, _, State::Down) => Some("no job is open at a board that is down"),
+        (EndedSheetIsLegal, Door::Question, _) => Some("a question is not ended early"),
+        (EndedSheetIsLegal, _, State::Unknown | State::AtRest | State::Down) => {
+            Some("of a sheet that is ended a part has crossed")
+        }
+        (NoQuestionInASheet, Door::Link | Door::Plain | Door::Stored | Door::Button, _) => Some("it is about questions"),
+        (NoQuestionInASheet, _, State::AtRest) => Some("the board would take a printer with a part of a sheet to have none"),
+        (NoQuestionInASheet, _, State::Down) => Some("nobody asks a board that is down"),
+        (OutIsOut, Door::Plain | Door::Stored | Door::Button | Door::Question, _) => {
+            Some("the program waits for sheets of its own jobs only")
+        }
+        (OutIsOut, _, State::Down) => Some("nobody asks a board that is down"),
+        (EveryJobEnds, Door::Question, _) => Some("it is about jobs"),
+        (EveryJobEnds, Door::Plain | Door::Button, _) => Some("such a job is known to the board alone"),
+        (StoredIsWholeOrBroken, Door::Link | Door::Plain | Door::Question, _) => Some("it is about stored jobs"),
+        (StoredIsWholeOrBroken, _, State::Unknown | State::AtRest | State::Down) => Some("it is judged in its sheet"),
+        _ => None,
+    }
 }

@@ -1,8 +1,8 @@
-//! Users and their processes: the program's own delivery, journal and notes, on a folder of this computer.
+//! Users and their processes: the program's own delivery and journal, on a folder of this computer.
 //!
-//! A process runs until it ends, is killed, or its user leaves. While it waits the other user may run one of his own, which ends
-//! before the first one goes on. A process that is killed unwinds without a word; what it has on disk stays as it is. Where the test
-//! may choose whom it is (root on Linux), each user has a number of his own, so that the sticky folder keeps them apart.
+//! A process runs until it ends, is killed, or its user leaves, and the other user's beside it. A process that is killed unwinds without
+//! a word; what it has on disk stays as it is. Whether a caller agrees to a question and how long it waits is drawn: a terminal, a
+//! script and a queue differ in nothing else.
 
 use crate::chance::{Draw, Kind};
 use crate::pool;
@@ -18,75 +18,28 @@ use device::transit::finish::Sheet;
 use device::transit::journal::{Journal, fresh_number};
 use device::transit::session::{Outcome, Phase};
 use observe::{Observer, Silent};
-use protocol::link::message::{JobState, PAST, Progress};
+use protocol::link::message::{JobState, PAST};
 use std::cell::{Cell, RefCell};
 use std::fs;
-use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// How long a bridge may take to answer.
 const BRIDGE: Duration = Duration::from_secs(3);
 
-/// The numbers of the users, and of one who may not open the bridge.
-#[cfg(target_os = "linux")]
-const NUMBERS: [u32; USERS + 1] = [10_001, 10_002, 10_003];
-
-/// Whether the test may choose who it is.
-pub fn can_be_others() -> bool {
-    #[cfg(target_os = "linux")]
-    return rustix::process::getuid().is_root();
-    #[cfg(not(target_os = "linux"))]
-    false
-}
-
-/// The process of this thread belongs to a user from now on, or to the test again.
-fn become_user(user: Option<usize>) {
-    #[cfg(target_os = "linux")]
-    if can_be_others() {
-        use rustix::thread::set_thread_res_uid;
-        let root = rustix::process::Uid::ROOT;
-        let number = user.map_or(root, |user| rustix::process::Uid::from_raw(NUMBERS[user]));
-        // From one user to another the way leads over root.
-        set_thread_res_uid(root, root, root).expect("root may");
-        set_thread_res_uid(root, number, root).expect("root may");
-    }
-    let _ = user;
-}
-
-/// A file that the test has written belongs to the user who may not open the bridge.
-pub fn give_to_stranger(path: &Path) {
-    #[cfg(target_os = "linux")]
-    if can_be_others() {
-        let before = rustix::process::geteuid().as_raw();
-        become_user(None);
-        std::os::unix::fs::lchown(path, Some(NUMBERS[USERS]), None).expect("root may");
-        become_user(NUMBERS.iter().position(|&number| number == before));
-    }
-    let _ = path;
-}
-
-/// The folders of a world.
+/// The folders of a world: that which all users share.
 pub fn furnish(folder: &Path) -> PathBuf {
-    let notes = folder.join("notes");
-    fs::create_dir(&notes).expect("a folder of our own");
+    let shared = folder.join("shared");
+    fs::create_dir(&shared).expect("a folder of our own");
     for user in 0..USERS {
-        fs::create_dir(home(&notes, user)).expect("a folder of our own");
+        fs::create_dir(home(&shared, user)).expect("a folder of our own");
     }
-    #[cfg(target_os = "linux")]
-    if can_be_others() {
-        use std::os::unix::fs::{PermissionsExt as _, chown};
-        fs::set_permissions(folder, fs::Permissions::from_mode(0o755)).expect("ours");
-        fs::set_permissions(&notes, fs::Permissions::from_mode(0o1777)).expect("ours");
-        for (user, &number) in NUMBERS[..USERS].iter().enumerate() {
-            chown(home(&notes, user), Some(number), None).expect("root may");
-        }
-    }
-    notes
+    shared
 }
 
-fn home(notes: &Path, user: usize) -> PathBuf {
-    notes.with_file_name(format!("jobs-{user}"))
+fn home(shared: &Path, user: usize) -> PathBuf {
+    shared.with_file_name(format!("jobs-{user}"))
 }
 
 fn address() -> Address {
@@ -157,29 +110,65 @@ impl Caller for Person<'_> {
     }
 }
 
-/// A user does something, whatever the numbers say.
-pub fn run(world: &Shared, user: usize, mut draw: Draw) {
-    let what = draw.below(12);
-    process(world, user, draw, false, |person, desk| match what {
-        0..=4 => desk.send(person),
-        5..=7 => desk.resume(person, what == 7),
-        8 => desk.store(person),
-        9 => desk.print_stored(person),
-        10 => desk.delete_stored(person),
-        _ => desk.reset(person),
-    });
+/// A process of a user from its beginning to its end: it does something, whatever the numbers say, or what is open comes to its end.
+pub fn run(world: &Shared, user: usize, mut draw: Draw, calm: bool) {
+    let what = if calm { None } else { Some(draw.below(15)) };
+    let shared = world.look().shared.clone();
+    let ended = catch_unwind(AssertUnwindSafe(|| {
+        let person = &Person {
+            world,
+            user,
+            which: Cell::new(0),
+            number: Cell::new(None),
+            waited: Cell::new(0),
+            wish: Cell::new(Wish::GoOn),
+            calm,
+            said: RefCell::new(draw),
+        };
+        let printers = Printers::at(&shared).expect("it is there");
+        let journal = Journal::at(&home(&shared, user)).expect("it is there");
+        let desk = Desk { printers: &printers, journal: &journal };
+        match what {
+            None => {
+                let open = desk.unfinished(person);
+                world.look().unfinished[user] = open.is_some();
+                desk.resume(person, false);
+            }
+            Some(0..=4) => desk.send(person),
+            Some(what @ 5..=7) => desk.resume(person, what == 7),
+            Some(8 | 9) => desk.store(person),
+            Some(10..=12) => desk.print_stored(person),
+            Some(13) => desk.delete_stored(person),
+            Some(_) => desk.reset(person),
+        }
+    }));
+    if let Err(payload) = ended
+        && !payload.is::<Killed>()
+    {
+        let said = payload.downcast_ref::<String>().cloned();
+        let said = said.or_else(|| payload.downcast_ref::<&str>().map(|said| (*said).into()));
+        world.look().crashed = Some(said.unwrap_or_else(|| "a process failed".into()));
+    }
 }
 
 /// When all is well again, the users go on by turns until none of their jobs is open: one may wait for another's.
 pub fn finish(world: &Shared) {
+    for user in 0..USERS {
+        await_end(world, user);
+    }
+    let known: Vec<u32> = world.look().known.keys().copied().collect();
+    for number in known {
+        let mut look = world.look();
+        if look.known.get(&number).is_some_and(|known| !known.told) {
+            look.endanger(Promise::EveryJobEnds, number);
+        }
+    }
     for _ in 0..40 {
         let mut open = false;
         for user in 0..USERS {
-            process(world, user, Draw::new(1), true, |person, desk| {
-                desk.end_orphan(person);
-                open |= desk.unfinished(person).is_some();
-                desk.resume(person, false);
-            });
+            world.begin(user, Draw::new(1), true);
+            await_end(world, user);
+            open |= world.look().unfinished[user];
         }
         if !open {
             return;
@@ -190,38 +179,10 @@ pub fn finish(world: &Shared) {
     world.fail(Promise::EveryJobEnds, found);
 }
 
-/// A process of a user from its beginning to its end.
-fn process(world: &Shared, user: usize, draw: Draw, calm: bool, act: impl FnOnce(&Person<'_>, &Desk<'_>)) {
-    let (notes, before) = {
-        let mut look = world.look();
-        let before = look.runs.iter().position(|runs| *runs);
-        (look.runs[user], look.doomed[user]) = (true, false);
-        (look.notes.clone(), before)
-    };
-    become_user(Some(user));
-    let ended = catch_unwind(AssertUnwindSafe(|| {
-        let person = Person {
-            world,
-            user,
-            which: Cell::new(0),
-            number: Cell::new(None),
-            waited: Cell::new(0),
-            wish: Cell::new(Wish::GoOn),
-            calm,
-            said: RefCell::new(draw),
-        };
-        let printers = Printers::at(&notes).expect("it is there");
-        let journal = Journal::at(&home(&notes, user)).expect("it is there");
-        act(&person, &Desk { printers: &printers, journal: &journal });
-    }));
-    become_user(before);
-    let mut look = world.look();
-    (look.runs[user], look.doomed[user]) = (false, false);
-    drop(look);
-    if let Err(payload) = ended
-        && !payload.is::<Killed>()
-    {
-        resume_unwind(payload);
+/// Lets time pass until this user's process has ended.
+fn await_end(world: &Shared, user: usize) {
+    while world.look().runs[user] {
+        world.step(Duration::from_millis(20));
     }
 }
 
@@ -237,7 +198,7 @@ impl Desk<'_> {
         person.which.set(which);
         let delivery = Delivery::new(self.printers, person);
         let Ok(job) = delivery.queue(self.journal, pool::packed(which), &address()) else { return };
-        let sent = delivery.send(self.journal, job, &address(), None, false);
+        let sent = delivery.send(self.journal, job, &address(), false, false);
         self.judge(person, &delivery, sent.ok().map(|ended| ended.outcome));
     }
 
@@ -275,9 +236,12 @@ impl Desk<'_> {
             let Some(known) = world.known.get_mut(&number) else { return };
             person.which.set(known.which);
             known.cancelled |= cancel;
+            if known.begun > 0 {
+                world.endanger(Promise::NothingTwice, number);
+            }
         }
         let delivery = Delivery::new(self.printers, person);
-        let sent = delivery.send(self.journal, job, &address(), None, cancel);
+        let sent = delivery.send(self.journal, job, &address(), false, cancel);
         if let Err(failure) = &sent {
             person.world.look().last_failure =
                 format!("user {}: {}", person.user, observe::with_causes(failure));
@@ -290,6 +254,12 @@ impl Desk<'_> {
         let (Some(number), Some(outcome)) = (person.number.get(), outcome) else { return };
         told(person.world, number, outcome);
         if outcome == Outcome::Printed && person.said.borrow_mut().one_in_1000(300) {
+            {
+                let mut world = person.world.look();
+                if world.known.get(&number).is_some_and(|known| known.out_at > world.now) {
+                    world.endanger(Promise::OutIsOut, number);
+                }
+            }
             let sheet = delivery.await_sheet(number, &address(), &mut |_| {});
             let mut world = person.world.look();
             let (now, out_at) = (world.now, world.known.get(&number).map(|known| known.out_at));
@@ -330,16 +300,6 @@ impl Desk<'_> {
         told(person.world, number, outcome);
     }
 
-    /// `foilpress cancel --to`: what is half stored, and whose sender was killed, is given up.
-    fn end_orphan(&self, person: &Person<'_>) {
-        let Ok(mut link) = person.open(&address(), None) else { return };
-        let Ok(mut query) = Query::new(&mut *link, BRIDGE) else { return };
-        let Progress { job, state, .. } = *query.progress();
-        if state == JobState::Storing {
-            let _ = query.cancel(job, BRIDGE);
-        }
-    }
-
     fn delete_stored(&self, person: &Person<'_>) {
         let Ok(mut link) = person.open(&address(), None) else { return };
         let Ok(mut query) = Query::new(&mut *link, BRIDGE) else { return };
@@ -352,23 +312,34 @@ impl Desk<'_> {
     fn reset(&self, person: &Person<'_>) {
         let Ok(mut link) = person.open(&address(), None) else { return };
         let Ok(mut query) = Query::new(&mut *link, BRIDGE) else { return };
-        // Whoever resets a bridge that has restarted gives up the job that it would go on with.
-        person.world.look().harmed = true;
-        let _ = deliver::reset(&mut query, self.printers);
+        // Refused while a job is open, whoever has sent it.
+        let _ = deliver::reset(&mut query);
     }
 }
 
 /// What somebody was told of a job, beside what is so.
-pub fn told(world: &Shared, number: u32, outcome: Outcome) {
+fn told(world: &Shared, number: u32, outcome: Outcome) {
     let mut world = world.look();
-    let Some(&known) = world.known.get(&number) else { return };
+    let Some(known) = world.known.get_mut(&number) else { return };
+    known.told = true;
+    let known = *known;
+    if known.torn {
+        world.endanger(Promise::LossIsTold, number);
+    }
+    if outcome == Outcome::Printed && known.touched {
+        world.endanger(Promise::PrintedIsAtThePrinter, number);
+    }
     let found = format!("job {number:08x} is told as {outcome:?}; {known:?}");
-    // A bridge remembers so many jobs, and whoever asks only behind them cannot be told.
+    // A bridge remembers so many jobs, and whoever asks only behind them cannot be told; nor can one behind a cut and another sheet.
     let is_long_ago = world.known.values().filter(|other| other.order > known.order).count() >= PAST;
+    let is_last = world.last_begun == number;
+    let harmed = known.harmed || known.stored && world.has_aged();
     let promise = match outcome {
         Outcome::Forgotten if is_long_ago => return,
         Outcome::Printed if known.whole != 1 => Promise::PrintedIsAtThePrinter,
-        Outcome::Lost | Outcome::Forgotten | Outcome::Broken if !world.harmed && !known.cancelled => {
+        Outcome::Cancelled | Outcome::Broken if known.torn => Promise::LossIsTold,
+        Outcome::Forgotten if known.torn && is_last => Promise::LossIsTold,
+        Outcome::Lost | Outcome::Forgotten | Outcome::Broken if !harmed && !known.cancelled => {
             Promise::HarmlessCostsNothing
         }
         Outcome::Cancelled if !known.cancelled => Promise::HarmlessCostsNothing,

@@ -1,8 +1,7 @@
 //! The world: one clock, one step at a time, everything looked at behind each.
 //!
-//! Time is in µs. A step is a turn of every task of the board; it takes 2 ms while bytes flow, and up to 25 while nothing does.
-//! Processes of users run inside it: whoever waits for the link lets steps pass, and in one of them the other user may begin and end
-//! something (`users`).
+//! Time is in µs. A step is a turn of every task of the board; it takes 2 ms while bytes flow, and up to 25 while nothing does. Processes
+//! of users act between steps ([`shared`]).
 
 mod accidents;
 mod shared;
@@ -14,16 +13,20 @@ use crate::board::{Board, Retained};
 use crate::chance::{Chance, Draw, Kind};
 use crate::pool::{self, Prepared};
 use crate::printer::Printer;
-use crate::promises::{Broken, Promise};
+use crate::promises::{Broken, Door, Promise, State, Table};
 use bridge::button::Press;
 use bridge::engine::{LOCAL, Memory};
+use bridge::simulation::{Peripheral, SimulatedPort};
+use bridge::standing::{QUESTION, Standing};
 use bridge::links::Way;
 use bridge::printer_class::End;
 use model::flash::ModelFlash;
 use model::seeded;
-use protocol::link::message::{Fault, JobState, Progress};
+use protocol::link::frame::Reader;
+use protocol::link::message::{ALONE, Fault, JobState, Progress};
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
+use std::time::Duration;
 
 pub use shared::{Killed, Shared};
 
@@ -56,6 +59,14 @@ pub struct Known {
     pub out_at: u64,
     /// It was asked to end early.
     pub cancelled: bool,
+    /// The printer has lost a part of it.
+    pub torn: bool,
+    /// Something happened to it that may cost a sheet, and anything at all.
+    pub harmed: bool,
+    /// Something happened while it was open.
+    pub touched: bool,
+    /// Its owner was told how it has ended.
+    pub told: bool,
 }
 
 /// A burst on its way.
@@ -97,19 +108,33 @@ pub struct World {
     pub printer: Printer,
     /// The first promise that was not kept.
     pub broken: Option<Broken>,
+    /// How often each was endangered.
+    pub endangered: Table,
+    /// What a process said when it failed as no process should.
+    pub crashed: Option<String>,
     /// Users whose process runs.
     pub runs: [bool; USERS],
     /// Processes that are to die.
     pub doomed: [bool; USERS],
-    /// The folder of notes.
-    pub notes: PathBuf,
+    /// For how long each process that waits would wait.
+    pub wants: [Option<Duration>; USERS],
+    /// Whether a user has a job that is open.
+    pub unfinished: [bool; USERS],
+    /// The folder of what all users share.
+    pub shared: PathBuf,
     /// What of the pool was sent already.
     pub used: usize,
     /// Why the last job that was resumed did not end.
     pub last_failure: String,
-    /// Something happened that may cost a sheet.
-    pub harmed: bool,
+    /// The job whose sheet was begun last.
+    pub last_begun: u32,
     seed: u64,
+    cable: SimulatedPort,
+    resets: usize,
+    /// For how long the driver has nothing to do.
+    pause_us: u64,
+    /// The printer's +5 V are absent.
+    is_off: bool,
     board: Option<Board>,
     memory: Option<Memory<'static>>,
     retained: Retained,
@@ -125,18 +150,27 @@ pub struct World {
     to_host: [VecDeque<(u64, Vec<u8>)>; USERS],
     /// What an operating system still has to print, and all of it.
     plain: Option<(usize, usize)>,
+    /// A bit of the flash has changed.
+    aged: bool,
+    readers: [Reader; USERS],
+    /// The job that was last seen to ask for bytes while the printer had a part of another one.
+    asked_into: Option<u32>,
     before: Progress,
-    /// The job of which bytes have crossed in this step.
-    crossed: Option<u32>,
-    speed: usize,
 }
 
 impl World {
     /// The world of a seed.
-    pub fn new(seed: u64, chance: Chance, notes: PathBuf, memory: Memory<'static>) -> World {
+    pub fn new(seed: u64, chance: Chance, shared: PathBuf, memory: Memory<'static>) -> World {
         let mut random = seeded(seed);
         let mut draw = Draw::new(seed ^ 0xb0a2d);
         let lag = ((draw.below(8_000) as u64) * MS, (1_000 + draw.below(30_000) as u64) * MS);
+        let work = 2_000_000 / [40, 200, 800, 2000][draw.below(4)];
+        let id = b"\0\x1cMANUFACTURER:ALPS;CLS:P;...".to_vec();
+        let cable = SimulatedPort::new(Peripheral { work, device_id: Some(id), ..Peripheral::default() });
+        // One world in ten has every edge of every line.
+        if draw.below(10) > 0 {
+            cable.quick();
+        }
         let mut world = World {
             now: 1_000_000,
             step: 0,
@@ -145,13 +179,21 @@ impl World {
             shelf: BTreeMap::new(),
             printer: Printer::new(lag),
             broken: None,
+            endangered: Table::default(),
+            crashed: None,
             runs: [false; USERS],
             doomed: [false; USERS],
-            notes,
+            wants: [None; USERS],
+            unfinished: [false; USERS],
+            shared,
             used: draw.below(pool::SIZE),
             last_failure: String::new(),
-            harmed: false,
+            last_begun: 0,
             seed,
+            cable,
+            resets: 0,
+            pause_us: 0,
+            is_off: false,
             board: None,
             memory: Some(memory),
             retained: Retained::new((draw.number() % 256) as u8),
@@ -163,9 +205,10 @@ impl World {
             to_board: Vec::new(),
             to_host: [const { VecDeque::new() }; USERS],
             plain: None,
+            aged: false,
+            readers: [const { Reader::new() }; USERS],
+            asked_into: None,
             before: NOTHING,
-            crossed: None,
-            speed: [40, 200, 800, 2000][draw.below(4)],
         };
         world.start(None);
         world
@@ -173,7 +216,7 @@ impl World {
 
     /// The world is over: the board's memory.
     pub fn end(mut self) -> Option<Memory<'static>> {
-        self.memory.take().or_else(|| Some(self.board.take()?.stop()))
+        self.memory.take().or_else(|| Some(self.board.take()?.stop(0)))
     }
 
     /// Notes a promise that was not kept, the first one only.
@@ -191,8 +234,65 @@ impl World {
     /// A user sends this job under this number.
     pub fn meet(&mut self, number: u32, which: usize, user: usize, stored: bool) {
         let order = self.known.len();
-        let known = Known { order, which, user, stored, begun: 0, whole: 0, out_at: 0, cancelled: false };
+        let known = Known {
+            order,
+            which,
+            user,
+            stored,
+            begun: 0,
+            whole: 0,
+            out_at: 0,
+            cancelled: false,
+            torn: false,
+            harmed: false,
+            touched: false,
+            told: false,
+        };
         self.known.entry(number).or_insert(known);
+    }
+
+    /// A promise could break now, by the door of this job.
+    pub fn endanger(&mut self, promise: Promise, number: u32) {
+        let (door, state) = (self.door(number), self.state());
+        self.endangered.note(promise, door, state);
+    }
+
+    /// By which door this job asks for bytes.
+    pub fn door(&self, number: u32) -> Door {
+        match number {
+            QUESTION => Door::Question,
+            LOCAL => Door::Plain,
+            ALONE => Door::Button,
+            _ if self.known.get(&number).is_some_and(|known| known.stored) => Door::Stored,
+            _ => Door::Link,
+        }
+    }
+
+    /// Where the board takes the printer to stand.
+    pub fn state(&self) -> State {
+        match self.board.as_ref().map(|board| board.engine.standing()) {
+            None => State::Down,
+            Some(Standing::Unknown { .. }) => State::Unknown,
+            Some(Standing::AtRest) => State::AtRest,
+            Some(Standing::InSheet(_)) => State::InSheet,
+        }
+    }
+
+    /// Something happens to the job that is open; `harms` if it may cost the sheet.
+    fn touch(&mut self, harms: bool) {
+        if let Some(known) = self.open_job().and_then(|number| self.known.get_mut(&number)) {
+            known.touched = true;
+            known.harmed |= harms;
+        }
+    }
+
+    /// The printer has lost what it had.
+    fn lose_part(&mut self) {
+        if let Some(number) = self.printer.reset()
+            && let Some(known) = self.known.get_mut(&number)
+        {
+            known.torn = true;
+        }
     }
 
     fn job(&self, number: u32) -> Option<&'static Prepared> {
@@ -209,18 +309,22 @@ impl World {
         self.flash.power_up();
         let known = matches!(after, Some(Down::Watchdog | Down::Run));
         let from_outside = after != Some(Down::Watchdog);
-        let board = Board::start(memory, self.retained.clone(), &self.flash, boot, known, from_outside);
+        let retained = self.retained.clone();
+        let board = Board::start(memory, &self.cable, retained, &self.flash, boot, known, from_outside);
         self.before = board.engine.progress();
         self.board = Some(board);
     }
 
-    /// The board goes down.
-    fn stop(&mut self, how: Down, draw: &mut Draw) {
+    /// The board goes down, with its last marks unmade.
+    fn stop(&mut self, how: Down, unmarked: u32, draw: &mut Draw) {
         let Some(board) = self.board.take() else { return };
-        self.memory = Some(board.stop());
+        self.memory = Some(board.stop(unmarked));
         if how == Down::Cut {
             // Its memory holds anything.
             self.retained = Retained::new((draw.number() % 256) as u8);
+            for known in self.known.values_mut().filter(|known| !known.told) {
+                known.harmed = true;
+            }
         }
         let away = 300 + draw.below(2_000) as u64;
         self.down = Some((self.now + away * MS, how));
@@ -257,11 +361,14 @@ impl World {
         if self.step >= LAST_STEP {
             self.doomed = self.runs;
         }
+        let before = self.now;
         self.chance.begin(self.step);
         let busy = !self.to_board.is_empty()
             || self.plain.is_some()
             || self.board.as_ref().is_some_and(|board| !board.engine.is_idle());
         self.now += if busy { 2 * MS } else { most.clamp(2 * MS, 25 * MS) };
+        let off = self.printer.off_until > self.now;
+        self.supply(off);
         if let Some((until, how)) = self.down
             && self.now >= until
         {
@@ -279,14 +386,19 @@ impl World {
             todo = Todo::Start(user, draw);
         }
         self.deliver();
-        self.work(down, &mut draw);
+        self.work(down, self.now - before, &mut draw);
         todo
     }
 
     /// Everything is well from now on.
     pub fn calm(&mut self) {
         self.chance.calm();
-        (self.printer.off_until, self.printer.paper_out_until, self.pulled_until) = (0, 0, 0);
+        (self.printer.off_until, self.pulled_until) = (0, 0);
+    }
+
+    /// Whether a bit of the flash has changed.
+    pub fn has_aged(&self) -> bool {
+        self.aged
     }
 
     /// The job that the bridge has open.
@@ -297,13 +409,9 @@ impl World {
     /// Where the board stands, and what is known of its job.
     pub fn standing(&self) -> String {
         let progress = self.board.as_ref().map(|board| board.engine.progress());
-        let notes = std::fs::read_dir(&self.notes).into_iter().flatten().filter_map(|item| {
-            let path = item.ok()?.path();
-            Some((path.file_name()?.to_owned(), std::fs::read_to_string(path).ok()?))
-        });
-        let notes: Vec<_> = notes.collect();
         let job = progress.and_then(|progress| self.known.get(&progress.job));
-        format!("{progress:?} of {job:?}, start {}, notes {notes:?}", self.starts)
+        let standing = self.board.as_ref().map(|board| board.engine.standing());
+        format!("{progress:?} of {job:?}, {standing:?}, start {}", self.starts)
     }
 
     /// Whether the board is busy with something that ends by itself.

@@ -125,8 +125,6 @@ pub async fn run(shared: &'static Shared, mut endpoint: BulkOut, _silent: BulkIn
                 Came::Time => intake.wake(engine, now_us()),
                 Came::Nothing => intake.end(End::Gone, engine, now_us()),
             });
-            // A plain job that begins is noted in the flash before the port has a byte of it.
-            shared.wake(Side::Store);
             shared.wake(Side::Work);
             if matches!(came, Came::Nothing) {
                 break;

@@ -13,7 +13,7 @@ fn the_link_is_answered_and_a_job_is_taken_while_the_printer_is_asked() {
     let status_answer = vec![Response { after: 1_500 * MS, bytes: status() }];
     let mut board = Board::new(4096, 4096);
     let mut bench = Bench::new(&mut board, answering(status_answer));
-    bench.tell(&ToBridge::Ask { request: 1, what: Ask::PrinterAtRest });
+    bench.tell(&ToBridge::Ask { request: 1, what: Ask::Printer });
     for request in 2..40 {
         let asked = bench.cable.now();
         bench.tell(&ToBridge::Ask { request, what: Ask::Lines });
@@ -47,7 +47,7 @@ fn a_task_goes_before_the_introduction_when_both_are_due() {
     );
     bench.pass(499 * MS);
     bench.cable.pass(10 * MS);
-    bench.tell(&ToBridge::Ask { request: 1, what: Ask::PrinterAtRest });
+    bench.tell(&ToBridge::Ask { request: 1, what: Ask::Printer });
     bench.pass(3 * MS);
     assert_eq!((bench.cable.taken(), events(&bench)), (vec![5, 1], vec![]));
     bench.hear("Answer { request: 1, answer: ");
@@ -80,7 +80,7 @@ fn no_poll_keeps_the_processor_for_a_millisecond() {
             let mut bench = Bench::new(&mut board, printer.clone());
             bench.tell(&ToBridge::Configure(settings(handshake, timing)));
             bench.turn();
-            bench.ask(1, Ask::PrinterAtRest);
+            bench.ask(1, Ask::Printer);
             bench.ask(2, Ask::DeviceId);
             let before = bench.cable.taken().len();
             send(&mut bench, 7, &foreign(1_000));

@@ -20,7 +20,7 @@ fn the_status_comes_back_whole_wherever_the_answer_breaks_and_however_late_it_is
         let mut board = Board::new(2048, 2048);
         let mut bench = Bench::new(&mut board, answering(pieces));
         assert_eq!(
-            bench.ask(1, Ask::PrinterAtRest),
+            bench.ask(1, Ask::Printer),
             text(Answer::Bytes(&whole)),
             "{first} bytes, {after_ms} ms"
         );
@@ -51,7 +51,7 @@ proptest! {
         bench.cable.plan(0, Line::Busy, 1);
         bench.cable.plan(busy_before_ms * MS, Line::Busy, 0);
         bench.cable.pass(1);
-        let answer = bench.ask(1, Ask::PrinterAtRest);
+        let answer = bench.ask(1, Ask::Printer);
         let taken = bench.cable.taken();
         let busy = busy_before_ms + busy_between_ms;
         if taken.len() < 2 {
@@ -79,7 +79,7 @@ fn a_printer_that_says_nothing_or_one_byte_is_silent_after_two_seconds() {
     for response in [vec![], vec![Response { after: MS, bytes: vec![0x06] }]] {
         let mut board = Board::new(2048, 2048);
         let mut bench = Bench::new(&mut board, answering(response));
-        assert_eq!(bench.ask(1, Ask::PrinterAtRest), text(Answer::Silent));
+        assert_eq!(bench.ask(1, Ask::Printer), text(Answer::Silent));
         let ms = bench.cable.now() / MS;
         assert!((2_000..2_400).contains(&ms), "{ms} ms");
         assert_eq!(bench.cable.taken(), [0x05, 0x01]);
@@ -97,7 +97,7 @@ fn a_printer_that_takes_no_question_is_silent_after_two_seconds_and_the_question
             bench.cable.plan(0, Line::Busy, 1);
             bench.cable.pass(1);
         }
-        assert_eq!(bench.ask(1, Ask::PrinterAtRest), text(Answer::Silent));
+        assert_eq!(bench.ask(1, Ask::Printer), text(Answer::Silent));
         let ms = bench.cable.now() / MS;
         assert!((2_000..2_100).contains(&ms), "{ms} ms");
         bench.pass(5_000 * MS);
@@ -118,7 +118,7 @@ fn a_printer_that_shows_a_fault_is_not_asked() {
         let mut bench = Bench::new(&mut board, answering(vec![Response { after: 0, bytes: status() }]));
         bench.cable.plan(0, line, level);
         bench.cable.pass(1);
-        assert_eq!(bench.ask(1, Ask::PrinterAtRest), text(Answer::Stopped(fault)));
+        assert_eq!(bench.ask(1, Ask::Printer), text(Answer::Stopped(fault)));
         assert!(bench.cable.now() < 5 * MS);
         assert!(bench.cable.taken().is_empty());
         // Between its two bytes.
@@ -126,7 +126,7 @@ fn a_printer_that_shows_a_fault_is_not_asked() {
         let mut board = Board::new(2048, 2048);
         let mut bench = Bench::new(&mut board, Peripheral { pauses, ..answering(vec![]) });
         if line != Line::Power {
-            assert_eq!(bench.ask(1, Ask::PrinterAtRest), text(Answer::Stopped(fault)));
+            assert_eq!(bench.ask(1, Ask::Printer), text(Answer::Stopped(fault)));
             assert_eq!(bench.cable.taken(), [0x05]);
         }
     }
@@ -140,7 +140,7 @@ fn a_printer_switched_off_in_the_middle_of_the_question_ends_it() {
         let mut board = Board::new(2048, 2048);
         let mut bench =
             Bench::new(&mut board, Peripheral { work, status: status_answer, ..Peripheral::default() });
-        bench.tell(&ToBridge::Ask { request: 1, what: Ask::PrinterAtRest });
+        bench.tell(&ToBridge::Ask { request: 1, what: Ask::Printer });
         bench.pass(100 * MS);
         bench.cable.switch(false);
         let answer = bench.hear("Answer { request: 1, answer: ");
@@ -161,16 +161,17 @@ fn the_printer_is_asked_only_when_it_is_known_to_stand_between_two_jobs() {
     let peripheral = || answering(vec![Response { after: 0, bytes: status() }]);
     let unsure = text(Answer::Unsure);
     let whole = text(Answer::Bytes(&status()));
-    // A bridge that has just got its supply does not know what the printer stands in.
+    // A bridge that has just got its supply, and whose diary says nothing, does not know what the printer stands in.
     let mut board = Board::new(4096, 4096);
-    let mut bench = Bench::new(&mut board, peripheral());
+    let mut bench = Bench::unaware(&mut board, peripheral());
     assert_eq!((bench.ask(1, Ask::Printer), bench.cable.taken().len()), (unsure.clone(), 0));
-    // Behind a reset, a job, or the printer's own switch it does.
+    assert_eq!(bench.ask(8, Ask::DeviceId), unsure, "a negotiation may disturb it");
+    // Behind a reset or a job it does.
     bench.tell(&ToBridge::Initialise { request: 7 });
     bench.pass(10 * MS);
     assert_eq!(bench.ask(2, Ask::Printer), whole);
     let mut board = Board::new(4096, 4096);
-    let mut bench = Bench::new(&mut board, peripheral());
+    let mut bench = Bench::unaware(&mut board, peripheral());
     send(&mut bench, 7, b"text");
     bench.pass(10 * MS);
     assert_eq!(bench.ask(3, Ask::Printer), whole);
@@ -184,15 +185,15 @@ fn the_printer_is_asked_only_when_it_is_known_to_stand_between_two_jobs() {
     bench.pass(50 * MS);
     bench.cable.switch(true);
     bench.pass(50 * MS);
-    assert_eq!(bench.ask(5, Ask::Printer), whole);
+    assert_eq!(bench.ask(5, Ask::Printer), unsure, "it was its switch, or only the cable");
     // A job that ended before a byte of it crossed says nothing.
     let mut board = Board::new(4096, 4096);
-    let mut bench = Bench::new(&mut board, peripheral());
+    let mut bench = Bench::unaware(&mut board, peripheral());
     bench.tell(&ToBridge::Begin { job: 7, kind: JobKind::Raw, length: 9 });
     bench.tell(&ToBridge::Cancel { job: 7 });
     bench.pass(10 * MS);
     assert_eq!((bench.state(), bench.ask(6, Ask::Printer)), (JobState::Cancelled, unsure.clone()));
-    // In the middle of a row even a host that thinks it knows better asks in vain: the reset is owed.
+    // In the middle of a row, too.
     send(&mut bench, 8, &foreign(3_000));
     bench.pass(5 * MS);
     bench.cable.plan(0, Line::Power, 0);
@@ -201,7 +202,7 @@ fn the_printer_is_asked_only_when_it_is_known_to_stand_between_two_jobs() {
     bench.cable.plan(0, Line::Power, 1);
     bench.pass(40 * MS);
     let had = bench.cable.taken().len();
-    assert_eq!((bench.state(), bench.cable.resets()), (JobState::Lost, 0));
-    assert_eq!(bench.ask(7, Ask::PrinterAtRest), unsure);
+    assert_eq!((bench.state(), bench.cable.resets()), (JobState::Lost, 1));
+    assert_eq!(bench.ask(7, Ask::Printer), unsure);
     assert_eq!(bench.cable.taken().len(), had);
 }

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use protocol::link::frame;
 use protocol::link::message::{
     Answer, Ask, DATA_MAX, Fault, Handshake, JobKind, JobState, Lines, PAST, PastJob, PortSettings, Refusal,
-    SCHEMA, ToBridge, ToHost, Usage, VERSION,
+    SCHEMA, Standing, ToBridge, ToHost, Usage, VERSION,
 };
 
 #[test]
@@ -15,7 +15,8 @@ fn a_greeting_is_answered_with_who_and_where() {
     let said = Rig::new().tell(ToBridge::Hello { version: VERSION, schema: SCHEMA });
     let hello = ToHost::Hello { version: VERSION, schema: SCHEMA, boot: 1, serial: 2, firmware: "test" };
     let past = ToHost::Past([PastJob::NONE; PAST]);
-    assert_eq!(said.text, [format!("{hello:?}"), format!("{past:?}")]);
+    let standing = ToHost::Standing { standing: Standing::AT_REST, job: 0 };
+    assert_eq!(said.text, [format!("{hello:?}"), format!("{past:?}"), format!("{standing:?}")]);
     assert_eq!(said.progress.unwrap().state, JobState::None);
 }
 
@@ -218,25 +219,25 @@ fn what_cannot_be_followed_is_refused_with_the_reason() {
     assert_eq!(rig.said().text, refused(Refusal::Unknown, 0));
 }
 
-/// A host may have to reset the printer for what another job has left in it, when its own one is open already.
+/// Whoever has sent it, and however little of it there is.
 #[test]
-fn a_job_of_which_nothing_has_crossed_is_printed_behind_a_reset_and_another_one_keeps_it_off() {
+fn a_job_that_is_open_is_given_up_by_its_number_and_by_nothing_else() {
     let stream = a_raw_job();
     let mut rig = Rig::new();
-    rig.open(1, &stream, 0);
+    for count in [0, 900] {
+        rig.open(1, &stream, count);
+        while rig.engine.work() {}
+        assert_eq!(rig.tell(ToBridge::Initialise { request: 7 }).text, refused(Refusal::JobOpen, 1));
+        assert_eq!(rig.tell(ToBridge::Abandon { job: 9 }).text, refused(Refusal::NoSuchJob, 9));
+        assert_eq!(rig.engine.task(), None);
+    }
+    assert_eq!(rig.send(1, JobKind::Raw, &stream).state, JobState::Done);
+    assert!(rig.printed == stream);
     assert_eq!(rig.tell(ToBridge::Initialise { request: 7 }).text, Vec::<String>::new());
     assert_eq!(rig.engine.task(), Some(Task::Initialise));
-    // Data that come meanwhile wait.
-    rig.open(1, &stream, 900);
-    while rig.engine.work() {}
-    assert!(rig.engine.output().is_empty());
     rig.engine.done(Outcome::Done);
     let lines = ToHost::Lines { request: 7, lines: Lines::IDLE, fault: None };
     assert!(rig.said().text.contains(&format!("{lines:?}")), "it is told when it has been done");
-    assert!(!rig.engine.output().is_empty());
-    assert_eq!(rig.tell(ToBridge::Initialise { request: 7 }).text, refused(Refusal::JobOpen, 1));
-    assert_eq!(rig.send(1, JobKind::Raw, &stream).state, JobState::Done);
-    assert!(rig.printed == stream);
 }
 
 /// A frame around bytes that are no message of this version.

@@ -2,7 +2,7 @@
 
 use super::{Rig, a_raw_job};
 use bridge::engine::Engine;
-use model::{IDENTITY, Job, NONE, Planes, is_a_whole_job, memory, run, seeded};
+use model::{IDENTITY, Job, NONE, Planes, is_a_whole_job, memory, rested, run, seeded};
 use protocol::link::message::{DefectKind, Fault, JobKind, JobState, Lines, PastJob, ToBridge};
 use protocol::walk::Placed;
 
@@ -157,11 +157,11 @@ fn a_page_too_wide_for_the_memory_is_refused_before_the_first_byte() {
         bits: vec![vec![1; 6000]],
         walk: Placed::whole(4800, 10),
     };
-    let mut rig = Rig::with(Engine::new(memory(2048, 2048, 38_399), IDENTITY));
+    let mut rig = Rig::with(rested(memory(2048, 2048, 38_399), IDENTITY));
     let state = rig.send(1, JobKind::Streams, &planes.streams()).state;
     assert!(matches!(state, JobState::Broken(defect) if defect.what == DefectKind::TooLarge));
     assert!(rig.printed.is_empty());
-    let mut rig = Rig::with(Engine::new(memory(2048, 2048, 38_400), IDENTITY));
+    let mut rig = Rig::with(rested(memory(2048, 2048, 38_400), IDENTITY));
     assert_eq!(rig.send(1, JobKind::Streams, &planes.streams()).state, JobState::Done);
 }
 
@@ -182,7 +182,7 @@ fn a_reset_from_outside_loses_a_job_whose_bytes_were_flowing_and_no_other() {
     rig.engine.port(Lines::IDLE, None);
     let flowing = rig.engine.checkpoint();
     let again = Engine::resume(memory(2048, 2048, 40_000), IDENTITY, flowing.reset_from_outside());
-    assert_eq!((again.progress().state, again.owes_reset()), (JobState::Lost, true));
+    assert_eq!((again.progress().state, again.standing().job()), (JobState::Lost, 7));
     assert_eq!(again.checkpoint().past[0], PastJob { job: 7, state: JobState::Lost, printed: 0 });
     rig.print();
     let waits = rig.engine.checkpoint();

@@ -5,8 +5,8 @@ mod jobs;
 mod plain;
 mod printer;
 
-use bridge::engine::{Engine, Outcome, Task};
-use model::{IDENTITY, Planes, framed, memory, seeded};
+use bridge::engine::Engine;
+use model::{IDENTITY, Planes, framed, memory, rested, seeded};
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{DATA_MAX, JobKind, JobState, Progress, Refusal, ToBridge, ToHost};
 
@@ -24,8 +24,9 @@ struct Said {
 }
 
 impl Rig {
+    /// A bridge whose diary says that the printer stands between two jobs.
     fn new() -> Rig {
-        Rig::with(Engine::new(memory(2048, 4096, 40_000), IDENTITY))
+        Rig::with(rested(memory(2048, 4096, 40_000), IDENTITY))
     }
 
     fn with(engine: Engine<'static>) -> Rig {
@@ -111,10 +112,6 @@ fn a_raw_job() -> Vec<u8> {
 fn offer(rig: &mut Rig, mut bytes: &[u8], size: usize) {
     while !bytes.is_empty() {
         let taken = rig.engine.local(&bytes[..size.min(bytes.len())]);
-        // The first job of a bridge that does not know where the printer stands.
-        if rig.engine.owes_reset() && rig.engine.task() == Some(Task::Initialise) {
-            rig.engine.done(Outcome::Done);
-        }
         bytes = &bytes[taken..];
         rig.print();
         assert!(taken > 0 || !rig.engine.work(), "nothing moves");

@@ -1,8 +1,8 @@
 //! Jobs through a plain printer interface, which has no frames and no numbers.
 
 use super::{Rig, a_raw_job, offer, refused};
-use bridge::engine::{LOCAL, Outcome, Task};
-use model::{Planes, is_a_whole_job, seeded};
+use bridge::engine::{Engine, LOCAL, Outcome, Task};
+use model::{IDENTITY, Planes, is_a_whole_job, memory, seeded};
 use protocol::link::message::{Fault, JobKind, JobState, Lines, Refusal, ToBridge};
 
 #[test]
@@ -100,18 +100,54 @@ fn the_link_and_a_plain_printer_interface_do_not_mix_their_jobs() {
 }
 
 #[test]
-fn a_printer_of_which_nothing_is_known_is_reset_before_the_first_byte_of_a_plain_job() {
+fn a_printer_of_which_nothing_is_known_is_reset_before_the_first_byte_of_any_job() {
+    let stream = a_raw_job();
+    for is_plain in [true, false] {
+        let mut rig = Rig::with(Engine::new(memory(2048, 4096, 40_000), IDENTITY));
+        for resets in [1, 0] {
+            let taken = match is_plain {
+                true => rig.engine.local(&stream),
+                false => {
+                    rig.open(1 + resets, &stream, 900);
+                    900
+                }
+            };
+            while rig.engine.work() {}
+            assert_eq!(rig.engine.task(), None, "nobody has looked at it yet");
+            rig.engine.port(Lines::IDLE, None);
+            assert_eq!(rig.engine.task(), [None, Some(Task::Initialise)][resets as usize]);
+            assert_eq!(rig.engine.output().is_empty(), resets > 0);
+            rig.engine.done(Outcome::Done);
+            match is_plain {
+                true => offer(&mut rig, &stream[taken..], 64),
+                false => drop(rig.send(1 + resets, JobKind::Raw, &stream)),
+            }
+            rig.print();
+            assert_eq!(rig.engine.progress().state, JobState::Done);
+        }
+        assert!(rig.printed == [&stream[..], &stream].concat());
+    }
+}
+
+/// A cable that is pulled looks as the switch does, and a reset that the printer has not noticed is none.
+#[test]
+fn a_printer_that_was_seen_without_its_supply_is_reset_until_it_has_noticed() {
     let stream = a_raw_job();
     let mut rig = Rig::new();
-    for resets in [1, 0] {
-        let taken = rig.engine.local(&stream);
-        while rig.engine.work() {}
-        assert_eq!(rig.engine.task().into_iter().filter(|task| *task == Task::Initialise).count(), resets);
-        assert_eq!(rig.engine.output().is_empty(), resets > 0);
+    for off in [Lines(Lines::IDLE.0 & !Lines::POWER), Lines(0)] {
+        rig.engine.port(off, Some(Fault::PowerOff));
+        rig.engine.port(Lines::IDLE, None);
+        offer(&mut rig, &stream[..stream.len() / 2], 64);
+        rig.engine.port(Lines::IDLE, None);
+        for _ in 0..3 {
+            assert_eq!((rig.engine.task(), rig.engine.output().len()), (Some(Task::Initialise), 0));
+            rig.engine.done(Outcome::Unnoticed);
+        }
+        assert_eq!(rig.engine.task(), Some(Task::Initialise));
         rig.engine.done(Outcome::Done);
-        offer(&mut rig, &stream[taken..], 64);
+        assert!(!rig.engine.output().is_empty());
+        offer(&mut rig, &stream[stream.len() / 2..], 64);
         rig.print();
-        assert_eq!(rig.engine.progress().state, JobState::Done);
+        assert_eq!((rig.engine.progress().state, rig.engine.task()), (JobState::Done, None));
     }
-    assert!(rig.printed == [&stream[..], &stream].concat());
 }

@@ -1,8 +1,11 @@
 //! What the engine does when the printer shows a fault or has lost its supply, and when it has it reset.
 
-use super::{Rig, a_raw_job};
+use super::{Rig, a_raw_job, refused};
 use bridge::engine::{Outcome, Task};
-use protocol::link::message::{DATA_MAX, Fault, JobKind, JobState, Lines, SCHEMA, ToBridge, VERSION};
+use bridge::standing::Standing;
+use protocol::link::message::{
+    DATA_MAX, Fault, JobKind, JobState, Lines, Refusal, SCHEMA, ToBridge, VERSION,
+};
 
 #[test]
 fn a_fault_stops_the_job_and_its_end_lets_it_go_on() {
@@ -15,7 +18,7 @@ fn a_fault_stops_the_job_and_its_end_lets_it_go_on() {
 }
 
 #[test]
-fn a_printer_without_its_supply_gets_nothing_and_no_reset() {
+fn a_printer_without_its_supply_gets_nothing_and_then_a_reset_before_the_first_byte() {
     let stream = a_raw_job();
     let mut rig = Rig::new();
     rig.open(1, &stream, DATA_MAX);
@@ -23,8 +26,11 @@ fn a_printer_without_its_supply_gets_nothing_and_no_reset() {
     assert!(!rig.engine.output().is_empty());
     let off = Lines(Lines::IDLE.0 & !Lines::POWER);
     rig.engine.port(off, Some(Fault::PowerOff));
-    assert!(rig.engine.output().is_empty() && rig.engine.output_behind(3).is_empty());
+    assert!(rig.engine.output().is_empty() && rig.engine.output_behind(3).is_empty() && rig.engine.task().is_none());
     rig.engine.port(Lines::IDLE, None);
+    assert!(rig.engine.output().is_empty());
+    assert_eq!(rig.engine.task(), Some(Task::Initialise));
+    rig.engine.done(Outcome::Done);
     assert!(!rig.engine.output().is_empty());
     // A job that ends where a reset is needed waits with it for the supply.
     let mut rig = Rig::new();
@@ -46,6 +52,9 @@ fn a_printer_switched_off_in_the_middle_gets_nothing_more() {
     rig.engine.port(Lines(0), Some(Fault::PowerOff));
     assert_eq!(rig.engine.progress().state, JobState::Stopped(Fault::PowerOff));
     while rig.engine.work() {}
+    rig.engine.port(Lines::IDLE, None);
+    assert_eq!(rig.engine.task(), Some(Task::Initialise));
+    rig.engine.done(Outcome::Done);
     rig.engine.consumed(1);
     rig.engine.port(Lines(0), Some(Fault::PowerOff));
     assert_eq!(rig.engine.progress().state, JobState::Lost);
@@ -101,8 +110,11 @@ fn a_job_nobody_has_the_data_of_any_more_can_be_given_up() {
     let said = rig.tell(ToBridge::Hello { version: VERSION, schema: SCHEMA });
     let progress = said.progress.unwrap();
     assert_eq!((progress.job, progress.accepted, progress.limit, progress.printed), (1, 0, 0, 100));
-    rig.tell(ToBridge::Initialise { request: 7 });
-    assert_eq!((rig.engine.progress().state, rig.engine.task()), (JobState::Lost, Some(Task::Initialise)));
+    assert_eq!(rig.tell(ToBridge::Initialise { request: 7 }).text, refused(Refusal::JobOpen, 1));
+    rig.tell(ToBridge::Abandon { job: 1 });
+    assert_eq!(rig.engine.task(), Some(Task::Initialise));
+    rig.engine.done(Outcome::Done);
+    assert_eq!((rig.engine.progress().state, rig.engine.standing()), (JobState::Lost, Standing::AtRest));
 }
 
 #[test]

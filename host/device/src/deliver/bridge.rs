@@ -1,22 +1,19 @@
 //! A job at a bridge: the questions before its first byte, the session, and what is noted when it ends.
 
-use std::cell::Cell;
 use std::time::Duration;
 
 use protocol::ink::Ink;
-use protocol::link::message::{Ask, Fault, JobKind, Progress};
+use protocol::link::message::{Ask, Fault, JobKind, Progress, Standing};
 
-use super::ask::{self, Negotiate};
 use super::{Cartridges, Delivery, Ended, Failure, Job, News, Packed, Question, ResetOwed, number};
 use crate::connection::Address;
-use crate::connection::Bridge;
 use crate::encodings::{self, Content, streams};
-use crate::printers::{Printer, Printers, PrintersError, Standing};
-use crate::questions::query::{Query, Reply, is_alps};
+use crate::printers::Printer;
+use crate::questions::query::{Query, QueryError, Reply, is_alps};
 use crate::transit::finish::{Sheet, await_sheet};
 use crate::transit::journal::{Journal, JournalError, OpenJob};
 use crate::transit::session::{Outcome, Phase, Record, Session, SessionError};
-use crate::transit::{self, Event, RunError, Wish};
+use crate::transit::{self, RunError, Wish};
 use observe::with_causes;
 
 /// How long a bridge may take to answer.
@@ -24,47 +21,27 @@ const BRIDGE: Duration = Duration::from_secs(3);
 /// How long it may take to ask the printer behind it.
 const PRINTER: Duration = Duration::from_secs(12);
 
-/// That the printer is ready for a job, as far as can be known, for as long as the bridge does not restart.
-#[derive(Clone, Copy, Debug)]
-pub struct Met {
-    boot: u32,
-}
-
-/// Resets the printer behind a bridge by the port's nInit line, and notes for everybody that it was. Refused while a job is
-/// open.
-pub fn reset(query: &mut Query<'_>, printers: &Printers) -> Result<(), Failure> {
+/// Resets the printer behind a bridge by the port's nInit line. Refused while a job is open.
+pub fn reset(query: &mut Query<'_>) -> Result<(), Failure> {
     if let (_, Some(Fault::PowerOff)) = query.lines(BRIDGE)? {
         return Err(Failure::PrinterOff);
     }
-    let noted = printers.noted(Some(&Printer::Bridge(query.bridge().serial)))?;
-    query.initialise(BRIDGE)?;
-    Ok(printers.reset(&noted, Some(query.bridge().boot))?)
+    Ok(query.initialise(BRIDGE)?)
 }
 
-/// Gives up the job that is open at a bridge, whoever has sent it, and has the printer reset; notes for everybody that it was.
-/// Says what the bridge made of it.
-pub fn give_up(query: &mut Query<'_>, job: u32, printers: &Printers) -> Result<Progress, Failure> {
-    let printer = Printer::Bridge(query.bridge().serial);
-    let noted = printers.noted(Some(&printer))?;
-    let ended = query.abandon(job, BRIDGE)?;
-    // A printer that is off is reset by the bridge when it is back, so the notes stay until then.
-    if !matches!(query.lines(BRIDGE)?, (_, Some(Fault::PowerOff))) {
-        printers.close(&printer, &format!("{job:08x}"))?;
-        printers.reset(&noted, Some(query.bridge().boot))?;
-    }
-    Ok(ended)
+/// Gives up the job that is open at a bridge, whoever has sent it, and has the printer reset. Says what the bridge made of it.
+pub fn give_up(query: &mut Query<'_>, job: u32) -> Result<Progress, Failure> {
+    Ok(query.abandon(job, BRIDGE)?)
 }
 
 /// Asks the printer at `address` for the cartridges of these inks. A bridge that does not answer is a reason why they are not
 /// known.
-pub fn find_cartridges(address: &Address, inks: &[Ink], printers: &Printers) -> Cartridges {
+pub fn find_cartridges(address: &Address, inks: &[Ink]) -> Cartridges {
     let ask = || -> Result<Reply, Failure> {
         let mut link = address.open()?;
         let mut query = Query::new(&mut *link, BRIDGE)?;
-        match query.lines(BRIDGE)? {
-            (_, Some(fault)) => Ok(Reply::Stopped(fault)),
-            (_, None) => Ok(ask::status(&mut query, printers, Negotiate::Known, PRINTER)?),
-        }
+        let fault = query.lines(BRIDGE)?.1;
+        Ok(ask_printer(&mut query, fault, Ask::Printer)?)
     };
     match ask() {
         Ok(reply) => Cartridges::read(reply, inks),
@@ -72,102 +49,67 @@ pub fn find_cartridges(address: &Address, inks: &[Ink], printers: &Printers) -> 
     }
 }
 
-/// Why the record of a job was not made durable, so that nothing left.
-#[derive(Debug, thiserror::Error)]
-enum NotSaved {
-    #[error(transparent)]
-    Journal(#[from] JournalError),
-    #[error(transparent)]
-    Printers(#[from] PrintersError),
-    #[error("the bridge has restarted")]
-    Restarted,
+/// Asks the printer something. One that takes no bytes takes no question either.
+fn ask_printer(query: &mut Query<'_>, fault: Option<Fault>, what: Ask) -> Result<Reply, QueryError> {
+    match fault {
+        Some(fault) => Ok(Reply::Stopped(fault)),
+        None => query.printer(what, PRINTER),
+    }
 }
 
 /// How an attempt to send ended.
 enum Attempt {
     Ended(Outcome, Option<Progress>),
-    /// The bridge restarted before the first byte, so the printer has to be judged again.
-    Again,
     /// The bridge has had another job with this number.
     NumberTaken,
 }
 
 impl Delivery<'_> {
     /// Makes sure that there is a bridge at `address` whose printer is ready for a job with these inks, as far as that can be
-    /// known: that it holds no part of another job, and is one of ALPS as far as it says what it is. `bridge` is the serial
-    /// number of the one that is meant, which is then found at any port.
-    pub fn meet(&self, address: &Address, bridge: Option<u64>, inks: &[Ink]) -> Result<Met, Failure> {
+    /// known: that nobody has to take a torn sheet out of it, and that it is one of ALPS as far as it says what it is. `bridge` is the
+    /// serial number of the one that is meant, which is then found at any port. Behind an open job nothing is asked.
+    pub fn meet(&self, address: &Address, bridge: Option<u64>, inks: &[Ink]) -> Result<(), Failure> {
         let mut link = self.caller.open(address, bridge)?;
         let mut query = Query::new(&mut *link, BRIDGE)?;
-        self.settle_earlier_jobs(&mut query)?;
+        if query.progress().is_open() {
+            self.caller.tell(&News::Printer(&Cartridges::read(Reply::NotNow, inks)));
+            return Ok(());
+        }
         let fault = query.lines(BRIDGE)?.1;
-        // One that takes no bytes takes no question either.
-        let id = match fault {
-            Some(fault) => Reply::Stopped(fault),
-            None => ask::device_id(&mut query, self.printers, Negotiate::Known, PRINTER)?,
-        };
-        if let Some(id) = id.device_id()
+        self.settle(&mut query, fault)?;
+        if let Some(id) = ask_printer(&mut query, fault, Ask::DeviceId)?.device_id()
             && !is_alps(&id)
             && !self.caller.agrees(&Question::NotAlps { id: &id })
         {
             return Err(Failure::NotAlps(id));
         }
-        let status = match fault {
-            Some(fault) => Reply::Stopped(fault),
-            None => ask::status(&mut query, self.printers, Negotiate::Known, PRINTER)?,
-        };
+        let status = ask_printer(&mut query, fault, Ask::Printer)?;
         self.caller.tell(&News::Printer(&Cartridges::read(status, inks)));
-        Ok(Met { boot: query.bridge().boot })
+        Ok(())
     }
 
-    /// Judges the jobs of which the printer may hold a part by what the bridge says of them. If it has forgotten one, the
-    /// printer is reset, should the caller agree.
-    fn settle_earlier_jobs(&self, query: &mut Query<'_>) -> Result<(), Failure> {
-        let (printer, boot) = (Printer::Bridge(query.bridge().serial), query.bridge().boot);
-        let progress = *query.progress();
-        let (mut owed, mut forgotten) = (None, Vec::new());
-        for unfinished in self.printers.unfinished(&printer)? {
-            match unfinished.standing(boot, &progress, query.past()) {
-                Standing::Ended { printed, whole } => {
-                    // Whoever sent it was gone before it heard so.
-                    self.counted(&unfinished.job, printed.into(), whole);
-                    self.close(&printer, &unfinished.job);
-                }
-                Standing::WithBridge => {}
-                Standing::ResetOwed => {
-                    owed = Some(ResetOwed { printer: printer.clone(), job: unfinished.job.clone() });
-                    if !unfinished.is_of(Some(boot)) {
-                        forgotten.push(unfinished.job);
-                    }
+    /// Has a printer reset of which its bridge does not know where it stands. If it may have a part of a job, somebody has to
+    /// agree, since the sheet has to be taken out. Otherwise the bridge would do it by itself, before the first byte; but only behind
+    /// it the printer can be asked something.
+    fn settle(&self, query: &mut Query<'_>, fault: Option<Fault>) -> Result<(), Failure> {
+        match query.standing() {
+            (Standing::AT_REST, _) => return Ok(()),
+            (_, 0) if fault.is_some() => return Ok(()),
+            (_, 0) => {}
+            (_, job) => {
+                let owed = ResetOwed { printer: Printer::Bridge(query.bridge().serial), job };
+                if !self.caller.agrees(&Question::Reset(&owed)) {
+                    return Err(Failure::ResetOwed(owed));
                 }
             }
         }
-        let Some(owed) = owed else { return Ok(()) };
-        if self.is_between_jobs(query, &printer)? {
-            // Another user has had it reset, or has switched it off and on.
-            forgotten.iter().for_each(|job| self.close(&printer, job));
-            return Ok(());
-        }
-        if !self.caller.agrees(&Question::Reset(&owed)) {
-            return Err(Failure::ResetOwed(owed));
-        }
-        reset(query, self.printers)?;
+        reset(query)?;
         self.caller.tell(&News::Reset);
         Ok(())
     }
 
-    /// Whether the bridge itself knows that the printer stands between two jobs. It says so by asking it for its status. A printer
-    /// that is disturbed by that is left alone, and then nobody knows.
-    fn is_between_jobs(&self, query: &mut Query<'_>, printer: &Printer) -> Result<bool, Failure> {
-        if self.printers.is_one_way(printer) {
-            return Ok(false);
-        }
-        let reply = query.printer(Ask::Printer, PRINTER)?;
-        Ok(matches!(reply, Reply::Bytes(_) | Reply::OneWay | Reply::Silent | Reply::Stopped(_)))
-    }
-
     /// Sends a job of the journal, or with `cancel` brings it to its end, until the bridge says how it ended. Jobs of which no
-    /// byte has left meet the printer first, unless that was just done: then `met` says so.
+    /// byte has left meet the printer first, unless that was just done: `met` says so.
     ///
     /// A job the bridge refuses as pass streams is sent byte for byte, under another number.
     pub fn send(
@@ -175,13 +117,12 @@ impl Delivery<'_> {
         journal: &Journal,
         mut job: OpenJob,
         address: &Address,
-        mut met: Option<Met>,
+        mut met: bool,
         cancel: bool,
     ) -> Result<Ended, Failure> {
         let data = std::mem::take(&mut job.data);
         loop {
-            match self.attempt(&mut job, &data, address, met.take(), cancel) {
-                Ok(Attempt::Again) => {}
+            match self.attempt(&mut job, &data, address, std::mem::take(&mut met), cancel) {
                 Ok(Attempt::NumberTaken) if cancel => {
                     // Its number is another job's: no bridge has anything of this one.
                     self.forget(&mut job)?;
@@ -194,7 +135,7 @@ impl Delivery<'_> {
                 Ok(Attempt::NumberTaken) => {
                     self.forget(&mut job)?;
                     let job = self.queue_again(journal, &job, &data, job.entry.record.kind)?;
-                    return self.send(journal, job, address, None, false);
+                    return self.send(journal, job, address, false, false);
                 }
                 Ok(Attempt::Ended(outcome, progress)) => {
                     let record = &job.entry.record;
@@ -206,7 +147,7 @@ impl Delivery<'_> {
                     if refused {
                         self.caller.tell(&News::ByteForByte);
                         let job = self.queue_again(journal, &job, &data, JobKind::Raw)?;
-                        return self.send(journal, job, address, None, false);
+                        return self.send(journal, job, address, false, false);
                     }
                     return Ok(Ended { entry: job.entry.clone(), outcome, progress });
                 }
@@ -266,7 +207,7 @@ impl Delivery<'_> {
         job: &mut OpenJob,
         data: &[u8],
         address: &Address,
-        met: Option<Met>,
+        met: bool,
         cancel: bool,
     ) -> Result<Attempt, Failure> {
         let wish = self.caller.wish();
@@ -284,26 +225,18 @@ impl Delivery<'_> {
         }
         let Record { phase, bridge, .. } = *session.record();
         let unsent = matches!(phase, Phase::Queued | Phase::Begun) && !session.record().cancel;
-        let met = match met {
-            None if unsent => {
-                let inks: Vec<Ink> =
-                    job.entry.passes.iter().filter_map(|pass| Ink::from_code(pass.ink)).collect();
-                Some(self.meet(address, bridge, &inks)?)
-            }
-            met => met.filter(|_| unsent),
-        };
+        if unsent && !met {
+            let inks: Vec<Ink> =
+                job.entry.passes.iter().filter_map(|pass| Ink::from_code(pass.ink)).collect();
+            self.meet(address, bridge, &inks)?;
+        }
         self.caller.tell(&News::Sending(&job.entry));
-        let watcher = Watcher { delivery: self, job: number(&job.entry), ..Watcher::new(self) };
-        watcher.serial.set(bridge);
         let result = transit::run_at(
             &mut session,
             &mut |bridge| self.caller.open(address, bridge),
             &mut |time| self.caller.pause(time),
-            &mut |record| {
-                watcher.before_saving(record, met)?;
-                Ok(job.save(record)?)
-            },
-            &mut |event| watcher.see(&event),
+            &mut |record| job.save(record),
+            &mut |event| self.caller.tell(&News::Link(&event)),
             &mut || self.caller.wish(),
         );
         if !matches!(result, Err(RunError::Save(_))) {
@@ -311,14 +244,9 @@ impl Delivery<'_> {
             job.entry.record = *session.record();
         }
         match result {
-            Ok(outcome) => {
-                watcher.ended(outcome, session.followed());
-                Ok(Attempt::Ended(outcome, session.progress().copied()))
-            }
+            Ok(outcome) => Ok(Attempt::Ended(outcome, session.progress().copied())),
             Err(RunError::Left) => Err(Failure::Left),
-            Err(RunError::Save(NotSaved::Restarted)) => Ok(Attempt::Again),
-            Err(RunError::Save(NotSaved::Journal(error))) => Err(error.into()),
-            Err(RunError::Save(NotSaved::Printers(error))) => Err(error.into()),
+            Err(RunError::Save(error)) => Err(error.into()),
             Err(RunError::Session(SessionError::NumberTaken(_))) => Ok(Attempt::NumberTaken),
             Err(RunError::Session(error)) => Err(error.into()),
             Err(RunError::Open(error)) => Err(error.into()),
@@ -336,104 +264,5 @@ impl Delivery<'_> {
         };
         await_sheet(job, &mut open, &mut pause, watch)
             .unwrap_or_else(|error| Sheet::Unknown(with_causes(&error)))
-    }
-}
-
-/// Keeps what is known of the printer true while a job is sent.
-struct Watcher<'d, 'a> {
-    delivery: &'d Delivery<'a>,
-    job: String,
-    /// The bridge at the other end, and its start.
-    serial: Cell<Option<u64>>,
-    boot: Cell<Option<u32>>,
-    /// The start of the bridge that is noted with this job; none before it is noted.
-    noted: Cell<Option<u32>>,
-    /// Whether a byte of this job has crossed the port.
-    moved: Cell<bool>,
-}
-
-impl<'d, 'a> Watcher<'d, 'a> {
-    fn new(delivery: &'d Delivery<'a>) -> Self {
-        Watcher {
-            delivery,
-            job: String::new(),
-            serial: Cell::new(None),
-            boot: Cell::new(None),
-            noted: Cell::new(None),
-            moved: Cell::new(false),
-        }
-    }
-
-    fn printer(&self) -> Option<Printer> {
-        self.serial.get().map(Printer::Bridge)
-    }
-
-    /// Before data leave it is on disk that the printer may hold a part of this job.
-    fn before_saving(&self, record: &Record, met: Option<Met>) -> Result<(), NotSaved> {
-        let (Phase::Sending, Some(printer)) = (record.phase, self.printer()) else { return Ok(()) };
-        if self.noted.get().is_some() {
-            return Ok(());
-        }
-        match met {
-            // What was found out before holds for one start of the bridge.
-            Some(met) if self.boot.get() != Some(met.boot) => return Err(NotSaved::Restarted),
-            Some(_) => self.delivery.printers.begin(&printer, &self.job, self.boot.get())?,
-            // It was noted when its first byte left. If the note is gone, the worst is assumed.
-            None if !self.delivery.printers.knows(&printer, &self.job) => {
-                self.delivery.printers.begin(&printer, &self.job, None)?;
-            }
-            None => return Ok(()),
-        }
-        self.noted.set(self.boot.get());
-        Ok(())
-    }
-
-    fn see(&self, event: &Event<'_>) {
-        match event {
-            Event::Connected(Bridge { serial, boot, .. }) => {
-                self.serial.set(Some(*serial));
-                self.boot.set(Some(*boot));
-            }
-            Event::Moved(progress) => self.see_progress(progress),
-            Event::Away(_) | Event::Fault(_) => {}
-        }
-        self.delivery.caller.tell(&News::Link(event));
-    }
-
-    fn see_progress(&self, progress: &Progress) {
-        let (Some(printer), printers) = (self.printer(), self.delivery.printers) else { return };
-        let shown = self.boot.get();
-        if self.noted.get().is_some() && self.noted.get() != shown {
-            // It has restarted and still has the job. Should this not be written, the next job asks for a needless reset.
-            let _ = printers.begin(&printer, &self.job, shown);
-            self.noted.set(shown);
-        }
-        if progress.printed > 0 && !self.moved.replace(true) {
-            // What crosses the port now comes behind whatever reset was owed.
-            for earlier in printers.unfinished(&printer).unwrap_or_default() {
-                if earlier.job != self.job && !earlier.is_of(shown) {
-                    self.delivery.close(&printer, &earlier.job);
-                }
-            }
-        }
-    }
-
-    /// What is known of the printer once the job has ended. A bridge that says a job is lost resets the printer by itself, as
-    /// long as it does not lose its memory too; so that job stays noted, as one of no start that is known, until bytes of another
-    /// one have crossed the port.
-    /// `followed` says that the bridge has printed another job since: then this one had ended, or was reset away, before it.
-    fn ended(&self, outcome: Outcome, followed: bool) {
-        let Some(printer) = self.printer() else { return };
-        match outcome {
-            Outcome::Printed | Outcome::Cancelled | Outcome::Broken | Outcome::Stored => {
-                self.delivery.close(&printer, &self.job);
-            }
-            Outcome::Forgotten if followed || self.delivery.printers.knows(&printer, &self.job) => {}
-            Outcome::Lost | Outcome::Forgotten => {
-                if let Err(error) = self.delivery.printers.begin(&printer, &self.job, None) {
-                    self.delivery.note(&with_causes(&error));
-                }
-            }
-        }
     }
 }

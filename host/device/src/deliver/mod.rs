@@ -8,19 +8,16 @@
 //! terminal asks, a queue holds the job, a script fails. A job passes through three states that are never mixed:
 //! *queued* (on disk, [`Delivery::queue`]), *sent* (every byte has crossed the port, [`Delivery::send`]) and *printed* (the
 //! printer itself says that it is done, [`Delivery::await_sheet`]).
-//! Before the first byte of a job leaves, the delivery asks whether the printer holds part of another one. The bridge's own
-//! answer decides where it can; if the bridge has forgotten, the caller has to agree to a reset. The answer holds for one
-//! start of the bridge: if it restarts between question and first byte, the question is asked again.
+//! Where the printer stands its bridge knows, and gives it no byte otherwise; the delivery asks the bridge, and its caller where a sheet
+//! has to be taken out. A device without a bridge is asked about by [notes](crate::printers).
 //! Cost: the bytes of a job are parsed once to [check](crate::encodings::check) that they are one whole legal
 //! job, because anything else wastes a sheet. Then [`streams`] codes its planes, which it reads back from
 //! bytes that come from elsewhere, and expands the code once, because a bridge must make exactly these bytes.
 //! Nothing is parsed again when a job is resumed: its checksum is compared. Only a job that a bridge refuses
 //! as pass streams is checked once more, as the ledger needs its passes. Limits: a raw device tells nothing,
-//! so nothing can be resumed there. A computer that shares a bridge with another one over the network knows
-//! only its own jobs; the bridge knows how the last sixteen have ended. Source: `docs/wire-format.md`,
-//! section 3; `docs/decisions/journal-before-deed.md`, `docs/decisions/reset-owed-by-the-printer.md`.
+//! so nothing can be resumed there. The bridge knows how the last sixteen jobs have ended. Source: `docs/wire-format.md`,
+//! section 3; `docs/decisions/journal-before-deed.md`, `docs/decisions/where-the-printer-stands.md`.
 
-pub mod ask;
 mod bridge;
 mod raw;
 pub mod store;
@@ -29,13 +26,13 @@ use std::borrow::Cow;
 use std::time::Duration;
 
 use protocol::ink::Ink;
-use protocol::link::message::{JobKind, Progress};
+use protocol::link::message::{ALONE, JobKind, LOCAL, Progress};
 
 use crate::connection::transport::Transport;
 use crate::connection::{Address, OpenError, find};
 use crate::encodings::{Checked, Content, streams};
 use crate::ledger::{self, Ledger, PassUse};
-use crate::printers::{Printer, Printers, PrintersError};
+use crate::printers::{Note, Printer, Printers, PrintersError};
 use crate::questions::cartridges::{self, Found};
 use crate::questions::query::{QueryError, Reply};
 use crate::questions::status::Status;
@@ -45,8 +42,7 @@ use crate::transit::session::{Outcome, SessionError};
 use crate::transit::{Event, Wish, words};
 use observe::{Observer, with_causes};
 
-use ask::AskError;
-pub use bridge::{Met, find_cartridges, give_up, reset};
+pub use bridge::{find_cartridges, give_up, reset};
 
 /// Whoever has something sent: hears what happens, and decides what the delivery cannot.
 pub trait Caller {
@@ -130,26 +126,30 @@ pub enum Question<'a> {
 pub struct ResetOwed {
     /// The printer.
     pub printer: Printer,
-    /// The job's number.
-    pub job: String,
+    /// The job's number, if it is at a bridge.
+    pub job: u32,
 }
 
 impl std::fmt::Display for ResetOwed {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self.printer {
-            Printer::Bridge(_) => write!(
-                f,
-                "{} may hold part of job {}, which its bridge no longer knows, and would print anything else as text until it is \
-                 reset",
-                self.printer, self.job
-            ),
-            Printer::Device(_) => write!(
-                f,
-                "{} may hold part of an interrupted job, and would print anything else as text until it has been switched off and \
-                 on",
-                self.printer
-            ),
-        }
+        let ResetOwed { printer, job } = self;
+        let part = match (printer, *job) {
+            (Printer::Device(_), _) => {
+                return write!(
+                    f,
+                    "{printer} may hold part of an interrupted job, and would print anything else as text until it has been \
+                     switched off and on"
+                );
+            }
+            (_, ALONE) => "a job that its button has started".into(),
+            (_, LOCAL) => "a job that was printed without this program".into(),
+            (_, job) => format!("job {job:08x}"),
+        };
+        write!(
+            f,
+            "{printer} may hold part of {part}, of which it will not get the rest. Take the sheet out; the bridge resets the printer \
+             before anything else goes to it"
+        )
     }
 }
 
@@ -165,9 +165,6 @@ pub enum Failure {
     /// A question to the bridge got no answer.
     #[error(transparent)]
     Query(#[from] QueryError),
-    /// A question to the printer got none.
-    #[error(transparent)]
-    Ask(#[from] AskError),
     /// The conversation cannot go on.
     #[error(transparent)]
     Session(#[from] SessionError),
@@ -207,7 +204,7 @@ pub enum Failure {
     },
     /// The job did not arrive as a whole.
     #[error("the job is not stored: {}; store it again", match .0 {
-        Outcome::Cancelled => "somebody has cancelled it, or the bridge has restarted",
+        Outcome::Cancelled => "somebody has cancelled it, nothing of it came for 30 s, or the bridge has restarted",
         Outcome::Broken => "the bridge's flash does not keep what is written; such a board is worn out",
         _ => "the bridge has restarted or lost its supply",
     })]
@@ -224,10 +221,10 @@ impl Failure {
             Failure::Open(error) => {
                 !matches!(error, OpenError::Forbidden(_) | OpenError::Several(_) | OpenError::Twins(_))
             }
-            Failure::Query(error) | Failure::Ask(AskError::Query(error)) => {
+            Failure::Query(error) => {
                 matches!(error, QueryError::Link(_) | QueryError::NoAnswer | QueryError::JobOpen(_))
             }
-            Failure::Session(error) => matches!(error, SessionError::Busy(_)),
+            Failure::Session(error) => matches!(error, SessionError::Busy(_) | SessionError::Storing(_)),
             Failure::Raw(RawError::Open { source, .. }) => {
                 source.kind() != std::io::ErrorKind::PermissionDenied
             }
@@ -241,7 +238,7 @@ impl Failure {
         matches!(
             self,
             Failure::Open(OpenError::InUse(_))
-                | Failure::Session(SessionError::Busy(_))
+                | Failure::Session(SessionError::Busy(_) | SessionError::Storing(_))
                 | Failure::Query(QueryError::JobOpen(_))
         )
     }
@@ -271,7 +268,7 @@ impl Cartridges {
             Reply::OneWay => Cartridges::Unknown("the printer's port is one-way".into()),
             Reply::Silent => Cartridges::Unknown("the printer did not answer".into()),
             Reply::Unsure => Cartridges::Unknown(
-                "the bridge has restarted, and the printer may be inside a job, where a question would be printed".into(),
+                "the bridge does not know whether the printer is inside a job, where a question would be printed".into(),
             ),
             Reply::NotAsked => Cartridges::Unknown("the printer was not asked".into()),
             Reply::Stopped(fault) => Cartridges::Unknown(words::fault(fault, None)),
@@ -366,11 +363,8 @@ pub struct Delivery<'a> {
 }
 
 impl<'a> Delivery<'a> {
-    /// A way for this caller. If what is known of printers is not shared with other users, or cannot be what it is, the caller is told.
+    /// A way for this caller.
     pub fn new(printers: &'a Printers, caller: &'a dyn Caller) -> Delivery<'a> {
-        for note in printers.notes() {
-            caller.tell(&News::Note(&note));
-        }
         Delivery { printers, ledger: Ledger::of(printers), caller }
     }
 
@@ -418,9 +412,9 @@ impl<'a> Delivery<'a> {
         }
     }
 
-    /// The printer holds nothing of this job any more. If that cannot be written down, the next job asks for a needless reset.
-    fn close(&self, printer: &Printer, job: &str) {
-        if let Err(error) = self.printers.close(printer, job) {
+    /// The printer holds nothing of this job any more. If that cannot be written down, somebody is asked a needless question.
+    fn close(&self, note: Note) {
+        if let Err(error) = self.printers.close(&[note]) {
             self.note(&with_causes(&error));
         }
     }

@@ -14,14 +14,16 @@ impl Delivery<'_> {
     /// Sends a job to a device. False if the caller ended it early, so that the sheet comes out unfinished and the printer is ready
     /// for the next job. Whether the bytes are printed only the printer shows.
     pub fn send_raw(&self, job: Job<'_>, device: &Path) -> Result<bool, Failure> {
-        let printer = Printer::Device(device.to_path_buf());
-        if let Some(unfinished) = self.printers.unfinished(&printer)?.pop() {
-            let noted = self.printers.noted(Some(&printer))?;
-            let owed = ResetOwed { printer: printer.clone(), job: unfinished.job };
+        if let Some(warning) = self.printers.warning() {
+            self.note(&warning);
+        }
+        let noted = self.printers.noted(Some(device))?;
+        if !noted.is_empty() {
+            let owed = ResetOwed { printer: Printer::Device(device.to_path_buf()), job: 0 };
             if !self.caller.agrees(&Question::Reset(&owed)) {
                 return Err(Failure::ResetOwed(owed));
             }
-            self.printers.reset(&noted, None)?;
+            self.printers.close(&noted)?;
         }
         loop {
             if self.caller.wish() != Wish::GoOn {
@@ -37,7 +39,7 @@ impl Delivery<'_> {
         let moment = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let number = format!("raw-{}-{}", moment.as_nanos(), std::process::id());
         self.caller.tell(&News::SendingRaw);
-        self.printers.begin(&printer, &number, None)?;
+        let note = self.printers.begin(device, &number)?;
         self.count(&number, job.checked, job.content.bytes().len() as u64);
         let stop = || self.caller.wish() != Wish::GoOn;
         let sent = raw::send_while(job.content.bytes(), device, self.caller.observer(), &stop);
@@ -48,7 +50,7 @@ impl Delivery<'_> {
         };
         self.counted(&number, taken as u64, whole);
         if sent.is_ok() || taken == 0 {
-            self.close(&printer, &number);
+            self.close(note);
         }
         Ok(sent?.whole)
     }

@@ -184,6 +184,21 @@ pub fn run(
     }
 }
 
+/// The chip of the only board there is, or of the bridge at `to`, which stays as it is.
+pub fn chip_there(to: Option<&Address>, computer: &mut impl Computer) -> Option<Chip> {
+    if let (None, [chip]) = (to, &computer.boards()[..]) {
+        return Some(*chip);
+    }
+    let bridges = match to {
+        Some(address) => vec![Candidate { serial_number: None, addresses: vec![address.clone()] }],
+        None => computer.bridges(),
+    };
+    match &bridges[..] {
+        [only] => computer.greet(only).map(|bridge| image::chip_of(&bridge.firmware)),
+        _ => None,
+    }
+}
+
 /// Brings a bridge into its boot loader and waits until the board appears there; returns the bridge's number.
 fn enter(
     bridge: &Candidate,

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
-    Answer, Ask, Fault, JobKind, JobState, Lines, PAST, PastJob, Progress, Refusal, SCHEMA, StoredJob,
-    ToBridge, ToHost, Usage, VERSION,
+    Answer, Ask, Fault, JobKind, JobState, Lines, PAST, PastJob, Progress, Refusal, SCHEMA, Standing,
+    StoredJob, ToBridge, ToHost, Usage, VERSION,
 };
 
 use crate::connection::transport::Transport;
@@ -30,7 +30,7 @@ pub enum Reply {
     Stopped(Fault),
     /// It is not known whether it stands between two jobs, and the question would be row data inside one.
     Unsure,
-    /// It was not asked, since it has shown that it does not negotiate, or the user does not want it.
+    /// It was not asked, since the user does not want it.
     NotAsked,
 }
 
@@ -69,7 +69,7 @@ pub enum QueryError {
     Version(Bridge),
     /// A job is open, so this must wait.
     #[error(
-        "the bridge is printing job {0:08x}; wait until it is done, or end it with `foilpress cancel {0:08x}`, which needs the \
+        "the bridge has job {0:08x} open; wait until it is done, or end it with `foilpress cancel {0:08x}`, which needs the \
          bridge's address for the job of another user or computer"
     )]
     JobOpen(u32),
@@ -126,15 +126,23 @@ pub struct Query<'t> {
     link: &'t mut dyn Transport,
     reader: Reader,
     request: u16,
+    said: Greeting,
+}
+
+/// What a bridge answers to a greeting.
+struct Greeting {
     bridge: Bridge,
     past: [PastJob; PAST],
     progress: Progress,
+    /// Where the printer stands, and the job of which it has or may have a part.
+    standing: (Standing, u32),
 }
 
 /// A message of the bridge that answers something.
 enum Heard {
-    Hello(Bridge),
+    Hello(Bridge, u32),
     Progress(Progress),
+    Standing(Standing, u32),
     Lines(u16, Lines, Option<Fault>),
     Answer(u16, Reply),
     Refused(Refusal, u32),
@@ -148,45 +156,34 @@ impl<'t> Query<'t> {
     /// Greets the bridge, which has to speak this program's messages. Changes nothing: a job under way goes on.
     pub fn new(link: &'t mut dyn Transport, patience: Duration) -> Result<Query<'t>, QueryError> {
         let query = Query::with_any(link, patience)?;
-        if query.bridge.version == VERSION { Ok(query) } else { Err(QueryError::Version(query.bridge)) }
+        if query.said.bridge.version == VERSION { Ok(query) } else { Err(QueryError::Version(query.said.bridge)) }
     }
 
     /// The same whatever messages it speaks: to put other firmware on it.
     pub fn with_any(link: &'t mut dyn Transport, patience: Duration) -> Result<Query<'t>, QueryError> {
         let mut reader = Reader::new();
-        let hello = ToBridge::Hello { version: VERSION, schema: SCHEMA };
-        let (mut bridge, mut past) = (None, None);
-        let (bridge, past, progress) =
-            exchange(link, &mut reader, &[hello], patience, &mut |heard| match heard {
-                // The other messages of another version may mean anything.
-                Heard::Hello(found) if found.version != VERSION => Some((found, NO_PAST, NOTHING)),
-                Heard::Hello(found) => {
-                    bridge = Some(found);
-                    None
-                }
-                Heard::Past(found) => {
-                    past = Some(*found);
-                    None
-                }
-                Heard::Progress(progress) => Some((bridge.clone()?, past?, progress)),
-                _ => None,
-            })?;
-        Ok(Query { link, reader, request: 0, bridge, past, progress })
+        let said = greet(link, &mut reader, patience)?;
+        Ok(Query { link, reader, request: 0, said })
     }
 
     /// Who answers.
     pub fn bridge(&self) -> &Bridge {
-        &self.bridge
+        &self.said.bridge
     }
 
     /// What it does.
     pub fn progress(&self) -> &Progress {
-        &self.progress
+        &self.said.progress
+    }
+
+    /// Where the printer stands, and the job of which it has a part, or may have; 0 if there is none.
+    pub fn standing(&self) -> (Standing, u32) {
+        self.said.standing
     }
 
     /// How the jobs before have ended, the last one first.
     pub fn past(&self) -> impl Iterator<Item = &PastJob> {
-        self.past.iter().filter(|past| past.job != 0)
+        self.said.past.iter().filter(|past| past.job != 0)
     }
 
     /// How much of its memory and time the firmware has used.
@@ -230,7 +227,7 @@ impl<'t> Query<'t> {
         patience: Duration,
     ) -> Result<Progress, QueryError> {
         let messages = [ToBridge::PrintStored { job, stored }];
-        let mut open = self.progress.job;
+        let mut open = self.said.progress.job;
         exchange(self.link, &mut self.reader, &messages, patience, &mut |heard| match heard {
             Heard::Progress(progress) if progress.job == job => Some(Ok(progress)),
             Heard::Progress(progress) => {
@@ -251,7 +248,7 @@ impl<'t> Query<'t> {
     ///
     /// Errors: [`QueryError::NotStored`], and [`QueryError::JobOpen`] while it is printed, beside those of every question.
     pub fn delete_stored(&mut self, stored: u32, patience: Duration) -> Result<(), QueryError> {
-        let (number, open) = (self.next(), self.progress.job);
+        let (number, open) = (self.next(), self.said.progress.job);
         let messages = [ToBridge::DeleteStored { request: number, stored }];
         exchange(self.link, &mut self.reader, &messages, patience, &mut |heard| match heard {
             Heard::Stored(request, ..) if request == number => Some(Ok(())),
@@ -299,7 +296,7 @@ impl<'t> Query<'t> {
     ///
     /// Errors: [`QueryError::JobOpen`] while a job is open, beside those of every question.
     pub fn probe(&mut self, data: u8, control: u8, patience: Duration) -> Result<Lines, QueryError> {
-        let (number, open) = (self.next(), self.progress.job);
+        let (number, open) = (self.next(), self.said.progress.job);
         let question = ToBridge::Probe { request: number, data, control };
         exchange(self.link, &mut self.reader, &[question], patience, &mut |heard| match heard {
             Heard::Lines(request, lines, _) if request == number => Some(Ok(lines)),
@@ -322,8 +319,7 @@ impl<'t> Query<'t> {
         })?
     }
 
-    /// Resets the printer by the port's nInit line. Refused while a job is open; a job that was open when the bridge
-    /// itself was reset, and whose data nobody has sent again, is given up by it.
+    /// Resets the printer by the port's nInit line. Refused while a job is open.
     pub fn initialise(&mut self, patience: Duration) -> Result<(), QueryError> {
         let number = self.next();
         let messages = [ToBridge::Initialise { request: number }];
@@ -372,20 +368,10 @@ impl<'t> Query<'t> {
         })?
     }
 
-    /// Where the job stands now.
+    /// Where the job stands now, and the printer.
     pub fn ask_progress(&mut self, patience: Duration) -> Result<Progress, QueryError> {
-        let hello = ToBridge::Hello { version: VERSION, schema: SCHEMA };
-        let mut greeted = false;
-        self.progress =
-            exchange(self.link, &mut self.reader, &[hello], patience, &mut |heard| match heard {
-                Heard::Hello(_) => {
-                    greeted = true;
-                    None
-                }
-                Heard::Progress(progress) if greeted => Some(progress),
-                _ => None,
-            })?;
-        Ok(self.progress)
+        self.said = greet(self.link, &mut self.reader, patience)?;
+        Ok(self.said.progress)
     }
 
     /// Sends the bridge to its boot loader, which ends the link.
@@ -418,6 +404,31 @@ impl<'t> Query<'t> {
 const NO_PAST: [PastJob; PAST] = [PastJob::NONE; PAST];
 const NOTHING: Progress =
     Progress { job: 0, state: JobState::None, accepted: 0, limit: 0, printed: 0, pass: 0, row: 0 };
+const NOT_SAID: (Standing, u32) = (Standing::UNKNOWN, 0);
+
+/// Greets a bridge, and waits for all that it says of itself.
+fn greet(link: &mut dyn Transport, reader: &mut Reader, patience: Duration) -> Result<Greeting, QueryError> {
+    let hello = ToBridge::Hello { version: VERSION, schema: SCHEMA };
+    let (mut bridge, mut past, mut progress, mut standing) = (None, None, None, None);
+    exchange(link, reader, &[hello], patience, &mut |heard| {
+        match heard {
+            // The other messages of another version may mean anything.
+            Heard::Hello(bridge, _) if bridge.version != VERSION => {
+                return Some(Greeting { bridge, past: NO_PAST, progress: NOTHING, standing: NOT_SAID });
+            }
+            Heard::Hello(found, schema) => {
+                bridge = Some(found);
+                // Firmware that does not know all messages may not know this one.
+                (past, progress, standing) = (None, None, (schema != SCHEMA).then_some(NOT_SAID));
+            }
+            Heard::Past(found) => past = Some(*found),
+            Heard::Progress(found) => progress = Some(found),
+            Heard::Standing(found, job) => standing = Some((found, job)),
+            _ => return None,
+        }
+        Some(Greeting { bridge: bridge.clone()?, past: past?, progress: progress?, standing: standing? })
+    })
+}
 
 /// Says `messages`, again and again, until `judge` is content with what is heard.
 fn exchange<T>(
@@ -465,11 +476,14 @@ fn exchange<T>(
 }
 
 fn heard(message: &[u8]) -> Option<Heard> {
-    let Ok(decoded) = frame::decode(message) else { return stranger(message).map(Heard::Hello) };
+    let Ok(decoded) = frame::decode(message) else {
+        return stranger(message).map(|bridge| Heard::Hello(bridge, 0));
+    };
     Some(match decoded {
-        ToHost::Hello { version, boot, serial, firmware, .. } => {
-            Heard::Hello(Bridge { version, boot, serial, firmware: printable(firmware) })
+        ToHost::Hello { version, schema, boot, serial, firmware } => {
+            Heard::Hello(Bridge { version, boot, serial, firmware: printable(firmware) }, schema)
         }
+        ToHost::Standing { standing, job } => Heard::Standing(standing, job),
         ToHost::Progress(progress) => Heard::Progress(progress),
         ToHost::Lines { request, lines, fault } => Heard::Lines(request, lines, fault),
         ToHost::Answer { request, answer } => Heard::Answer(

@@ -71,7 +71,9 @@ pub(crate) fn await_sheet(
             Reply::OneWay => return Ok(unknown("the printer's port is one-way")),
             Reply::NotNow => return Ok(unknown("the bridge already has another job")),
             Reply::Unsure | Reply::NotAsked => {
-                return Ok(unknown("the bridge has restarted, and does not know what the printer is doing"));
+                return Ok(unknown(
+                    "the printer was switched off, its cable was pulled, or the bridge has restarted, which does not know what it is doing",
+                ));
             }
             Reply::Stopped(Fault::PowerOff) => {
                 return Ok(unknown("the printer is switched off or its cable is loose"));

@@ -68,6 +68,12 @@ pub enum SessionError {
          needs the bridge's address for the job of another user or computer"
     )]
     Busy(u32),
+    /// Somebody else's job is being stored.
+    #[error(
+        "the bridge is storing another job ({0:08x}), and drops it when nothing of it has come for 30 s; wait until it is stored, or \
+         end that with `foilpress cancel {0:08x}`, which needs the bridge's address for the job of another user or computer"
+    )]
+    Storing(u32),
     /// The number was used for another job.
     #[error("the bridge has had another job with the number {0:08x}; send this one again")]
     NumberTaken(u32),
@@ -94,8 +100,6 @@ pub struct Session<'d> {
     greeted: bool,
     /// The bridge has told on this link how the jobs before have ended.
     recalled: bool,
-    /// The bridge has shown another job of which bytes have crossed the port.
-    followed: bool,
     /// What the bridge last said of this job since it last restarted.
     progress: Option<Progress>,
     /// The next byte to send.
@@ -125,7 +129,6 @@ impl<'d> Session<'d> {
             bridge: None,
             greeted: false,
             recalled: false,
-            followed: false,
             progress: None,
             next: 0,
             rewound: None,
@@ -155,11 +158,6 @@ impl<'d> Session<'d> {
     /// What the bridge last said of this job.
     pub fn progress(&self) -> Option<&Progress> {
         self.progress.as_ref()
-    }
-
-    /// Whether the bridge has shown another job of which bytes have crossed the port.
-    pub fn followed(&self) -> bool {
-        self.followed
     }
 
     /// The bridge, once it has introduced itself.
@@ -305,9 +303,7 @@ impl<'d> Session<'d> {
         if self.record.phase == Phase::Queued {
             return Err(SessionError::NumberTaken(progress.job));
         }
-        if let Some(outcome) = outcome(progress.state) {
-            self.record.phase = Phase::Ended(outcome);
-            self.record.printed = progress.printed;
+        if self.ends(progress.state, progress.printed) {
             self.progress = Some(progress);
             return Ok(());
         }
@@ -342,6 +338,16 @@ impl<'d> Session<'d> {
         Ok(())
     }
 
+    /// The job is over, if this state says so.
+    fn ends(&mut self, state: JobState, printed: u32) -> bool {
+        let Some(outcome) = outcome(state) else { return false };
+        self.record.phase = Phase::Ended(outcome);
+        // A bridge that has lost its memory does not know how much of a lost sheet was printed.
+        let before = if outcome == Outcome::Lost { self.record.printed } else { 0 };
+        self.record.printed = printed.max(before);
+        true
+    }
+
     /// The bridge tells how earlier jobs have ended.
     fn recall(&mut self, past: &[PastJob]) -> Result<(), SessionError> {
         self.recalled = true;
@@ -349,16 +355,12 @@ impl<'d> Session<'d> {
         if self.record.phase == Phase::Queued {
             return Err(SessionError::NumberTaken(past.job));
         }
-        if let Some(outcome) = outcome(past.state) {
-            self.record.phase = Phase::Ended(outcome);
-            self.record.printed = past.printed;
-        }
+        self.ends(past.state, past.printed);
         Ok(())
     }
 
     /// The bridge tells of another job.
     fn place_other(&mut self, now: Duration, progress: Progress) -> Result<(), SessionError> {
-        self.followed |= progress.job != 0 && progress.printed > 0;
         let open = progress.is_open();
         match self.record.phase {
             // Nothing of it has ever left, and the bridge does not have it.
@@ -369,7 +371,10 @@ impl<'d> Session<'d> {
             }
             Phase::Queued | Phase::Begun if open => {
                 if self.convinced(now) {
-                    return Err(SessionError::Busy(progress.job));
+                    return Err(match progress.state {
+                        JobState::Storing => SessionError::Storing(progress.job),
+                        _ => SessionError::Busy(progress.job),
+                    });
                 }
             }
             Phase::Sending => {

@@ -63,10 +63,6 @@ pub fn wanted(passes: &[PassPlace], printed: u64) -> Option<Ink> {
     pass_at(passes, at).map(|(_, ink)| ink)
 }
 
-/// What to do with a printer that was left in the middle of a sheet.
-const RESET: &str = "The printer must be reset before the next job: `foilpress bridge reset` resets it through the bridge. If \
-                     the sheet stays in, switch the printer off and on";
-
 /// Where on the sheet a job was last heard of.
 fn reached(entry: &Entry) -> String {
     match pass_at(&entry.passes, u64::from(entry.record.printed)) {
@@ -106,16 +102,16 @@ pub fn outcome(outcome: Outcome, entry: &Entry, progress: Option<&Progress>) -> 
             )
         }
         Outcome::Lost => format!(
-            "{}: the sheet is lost{}: the printer was switched off or its cable pulled during the job, the bridge restarted \
-             and the job's data are gone, or someone gave the job up with `foilpress bridge reset`. The bridge resets the printer before the next job. Take out the sheet, and send the job \
-             again",
+            "{}: the sheet is lost{}: the printer was switched off or its cable pulled during the job, the bridge lost its supply, or someone \
+             gave the job up with `foilpress bridge reset`. Take out the sheet, and send the job again; the bridge resets the printer before \
+             the next one",
             entry.name,
             reached(entry)
         ),
         Outcome::Forgotten => format!(
             "{}: the bridge no longer knows this job, because it lost its memory or has printed many others since. At least {printed} of \
-             {} bytes were printed{}. If the sheet comes out complete, nothing is wrong; otherwise it is lost. {RESET}. The job is \
-             not sent again by itself, so that nothing is printed twice",
+             {} bytes were printed{}. If the sheet comes out complete, nothing is wrong; otherwise it is lost: take it out. The job is not \
+             sent again by itself, so that nothing is printed twice",
             entry.name,
             entry.port_bytes,
             reached(entry)

@@ -96,8 +96,7 @@ fn what_another_user_left_in_the_printer_holds_every_job_until_it_is_released_or
     let mut rig = Rig::new();
     let bytes = job(Ink::Cyan, 30);
     let Destination::Raw(device) = rig.call.to.clone() else { unreachable!() };
-    let printer = Printer::Device(device);
-    rig.printers.begin(&printer, "raw-1-1", None).unwrap();
+    rig.printers.begin(&device, "raw-1-1").unwrap();
     for identity in ["one", "two"] {
         rig.call.identity = identity.into();
         let (exit, said) = rig.run(&bytes, &|| false);
@@ -107,12 +106,12 @@ fn what_another_user_left_in_the_printer_holds_every_job_until_it_is_released_or
     assert!(rig.got().is_empty());
     assert_eq!(rig.run(&bytes, &|| false).0, Exit::Ok, "released");
     assert!(rig.got() == bytes);
-    assert_eq!(rig.printers.unfinished(&printer).unwrap(), []);
+    assert_eq!(rig.printers.noted(Some(&device)).unwrap(), []);
     // So the other one is not asked again.
     rig.call.identity = "one".into();
     assert_eq!(rig.run(&bytes, &|| false).0, Exit::Ok);
-    rig.printers.begin(&printer, "raw-1-2", None).unwrap();
-    rig.printers.reset(&rig.printers.noted(None).unwrap(), None).unwrap();
+    rig.printers.begin(&device, "raw-1-2").unwrap();
+    rig.printers.close(&rig.printers.noted(None).unwrap()).unwrap();
     rig.call.identity = "three".into();
     assert_eq!(rig.run(&bytes, &|| false).0, Exit::Ok);
 }

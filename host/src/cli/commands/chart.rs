@@ -14,7 +14,6 @@ use crate::cli::printing::{self, JobArgs, ResultArgs, print_dots};
 use art::names::typed;
 use device::connection::Destination;
 use device::deliver::{Cartridges, find_cartridges};
-use device::printers::Printers;
 use device::questions::status::Status;
 use observe::Observer;
 use press::chart;
@@ -336,7 +335,7 @@ impl WholePage {
     /// The inks that the printer at the destination says are loaded; the process inks if there is no printer to ask.
     fn loaded(&self, observer: &dyn Observer) -> Result<Vec<Ink>> {
         let Some(Destination::Bridge(address)) = &self.deliver.to else { return Ok(PROCESS.to_vec()) };
-        let why = match find_cartridges(address, &[], &Printers::of_system()?) {
+        let why = match find_cartridges(address, &[]) {
             Cartridges::Unknown(why) => why,
             Cartridges::Known { status, .. } => match loaded(&status) {
                 inks if inks.is_empty() => "it reports none that it could print with".into(),

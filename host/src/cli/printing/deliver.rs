@@ -12,7 +12,7 @@ use crate::cli::console::terminal::{Terminal, cartridges_needed, cartridges_text
 use crate::cli::console::{show, stderr};
 use crate::cli::output::{self, Staged};
 use device::connection::{Address, Destination};
-use device::deliver::{Delivery, Ended, Failure, Job, Packed, find_cartridges};
+use device::deliver::{Cartridges, Delivery, Ended, Failure, Job, Packed, find_cartridges};
 use device::encodings::{self, Content};
 use device::printers::Printers;
 use device::transit::finish::Sheet;
@@ -60,14 +60,17 @@ impl DeliverArgs {
         };
         let name = &job.draft.plan.document;
         let checked = encodings::check(&job.bytes, observer)?;
+        let mut cartridges_shown = false;
         if let Destination::Bridge(address) = to {
-            let cartridges = find_cartridges(address, &checked.inks, &Printers::of_system()?);
+            let cartridges = find_cartridges(address, &checked.inks);
+            // What is not known now may be behind the reset that the printer gets before the job.
+            cartridges_shown = matches!(cartridges, Cartridges::Known { .. });
             show(&format!("{}\n", cartridges_text(&cartridges, checked.by_hand)))?;
         }
         if !self.yes {
             confirm(name)?;
         }
-        let order = Order { copies: self.copies, force: self.force, cartridges_shown: true };
+        let order = Order { copies: self.copies, force: self.force, cartridges_shown };
         deliver(Job { name, content: Content::Made(job), checked: &checked }, to, order, observer)
     }
 }
@@ -173,11 +176,7 @@ fn to_bridge(job: Job<'_>, address: &Address, order: Order, observer: &dyn Obser
         Terminal::new(order.force, order.cartridges_shown, observer).fed_by_hand(job.checked.by_hand);
     let delivery = Delivery::new(&printers, &terminal);
     // Before anything is queued: a mistyped address or a missing permission leaves no job behind.
-    let mut met = Some(
-        delivery
-            .meet(address, None, &job.checked.inks)
-            .map_err(|failure| not_sent(failure, Some(address)))?,
-    );
+    delivery.meet(address, None, &job.checked.inks).map_err(|failure| not_sent(failure, Some(address)))?;
     let journal = Journal::of_user()?;
     journal.tidy()?;
     let packed = Packed::new(job, observer);
@@ -191,7 +190,7 @@ fn to_bridge(job: Job<'_>, address: &Address, order: Order, observer: &dyn Obser
     for (copy, queued) in (1..).zip(queue) {
         let kept = kept(&queued, address);
         let ended = delivery
-            .send(&journal, queued, address, met.take(), false)
+            .send(&journal, queued, address, copy == 1, false)
             .map_err(|failure| advised(failure, Some(address)))
             .with_context(kept)?;
         finish(&delivery, &ended, address, false, observer)?;
@@ -216,7 +215,7 @@ pub fn go_on(
     let delivery = Delivery::new(&printers, &terminal);
     let kept = kept(&job, address);
     let ended = delivery
-        .send(journal, job, address, None, cancel)
+        .send(journal, job, address, false, cancel)
         .map_err(|failure| advised(failure, Some(address)))
         .with_context(kept)?;
     finish(&delivery, &ended, address, cancel, observer)
@@ -288,10 +287,7 @@ fn not_sent(failure: Failure, to: Option<&Address>) -> anyhow::Error {
 /// A failure with what can be done about it on the command line.
 fn advised(failure: Failure, to: Option<&Address>) -> anyhow::Error {
     let advice = match (&failure, to) {
-        (Failure::ResetOwed(_), Some(to)) => format!(
-            "`foilpress bridge reset --to {to}` resets it through the bridge; if you have switched it off and on: \
-             `foilpress bridge reset --by-hand`"
-        ),
+        (Failure::ResetOwed(_), Some(to)) => format!("then `foilpress bridge reset --to {to}`, and send the job again"),
         (Failure::ResetOwed(_), None) => {
             "switch it off and on, then confirm that with `foilpress bridge reset --by-hand`".into()
         }

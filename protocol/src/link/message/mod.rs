@@ -19,7 +19,7 @@ mod to_host;
 mod tests;
 
 pub use job::{Defect, DefectKind, JobKind, JobState, PastJob, Progress, StoredJob};
-pub use port::{Fault, Handshake, Lines, PortSettings};
+pub use port::{Fault, Handshake, Lines, PortSettings, Standing};
 pub use to_bridge::{Ask, ToBridge};
 pub use to_host::{Answer, Refusal, ToHost, Usage};
 
@@ -29,7 +29,7 @@ pub const VERSION: u8 = 5;
 
 /// Fingerprint of the message set: the CRC-32 over one example of every variant. With equal fingerprints, host and bridge
 /// know the same messages. With different fingerprints but the same version, both understand everything the older knows.
-pub const SCHEMA: u32 = 0x887e_b954;
+pub const SCHEMA: u32 = 0x9d69_23f6;
 
 /// Levels of the data lines and of nStrobe, nAutoFd, nInit, nSelectIn (bits 0..3) at rest: with them a wiring test ends.
 pub const AT_REST: (u8, u8) = (0, 0b0111);
@@ -37,6 +37,8 @@ pub const AT_REST: (u8, u8) = (0, 0b0111);
 /// How many ended jobs a bridge remembers.
 pub const PAST: usize = 16;
 
+/// The number of a job that came through the bridge's plain printer interface.
+pub const LOCAL: u32 = u32::MAX;
 /// The number of a job that was started with the bridge's button.
 pub const ALONE: u32 = u32::MAX - 1;
 

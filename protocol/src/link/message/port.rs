@@ -88,6 +88,19 @@ impl Lines {
     }
 }
 
+/// Where the printer stands, as far as the bridge knows. Any other number says that it does not know.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct Standing(pub u8);
+
+impl Standing {
+    /// The bridge does not know. The printer may have a part of a job.
+    pub const UNKNOWN: Standing = Standing(0);
+    /// It stands between two jobs.
+    pub const AT_REST: Standing = Standing(1);
+    /// It has a part of a job, and waits for the rest.
+    pub const IN_SHEET: Standing = Standing(2);
+}
+
 /// Why the printer does not take bytes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -62,7 +62,7 @@ fn to_bridge() -> Vec<(ToBridge<'static>, &'static [u8])> {
         (ToBridge::Probe { request: 300, data: 0xaa, control: 0b0111 }, &[9, 0xac, 0x02, 0xaa, 7]),
         (ToBridge::ReadLog { request: 300, from: 1200 }, &[10, 0xac, 0x02, 0xb0, 9]),
         (ToBridge::Abandon { job: 7 }, &[11, 7]),
-        (ask(Ask::PrinterAtRest), &[4, 0xac, 0x02, 3]),
+        (ask(Ask::Vouched), &[4, 0xac, 0x02, 3]),
         (ask(Ask::Board), &[4, 0xac, 0x02, 4]),
         (
             ToBridge::Store { job: 7, kind: JobKind::Streams, length: 1061, name: "leaf" },
@@ -138,6 +138,11 @@ fn to_host() -> Vec<(ToHost<'static>, &'static [u8])> {
             stored(Some(StoredJob { job: 7, kind: JobKind::Streams, length: 1061, name: "leaf" })),
             &[9, 3, 1, 0xe8, 7, 0xd0, 0x0f, 1, 7, 1, 0xa5, 0x08, 4, b'l', b'e', b'a', b'f'],
         ),
+        (ToHost::Standing { standing: Standing::UNKNOWN, job: 7 }, &[10, 0, 7]),
+        (ToHost::Standing { standing: Standing::AT_REST, job: 0 }, &[10, 1, 0]),
+        (ToHost::Standing { standing: Standing::IN_SHEET, job: 300 }, &[10, 2, 0xac, 2]),
+        // Of a later version: it says nothing that is known.
+        (ToHost::Standing { standing: Standing(200), job: 0 }, &[10, 200, 0]),
     ]
 }
 

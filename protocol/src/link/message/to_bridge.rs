@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 /// From the workstation to the bridge.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum ToBridge<'a> {
-    /// A host has connected. Answered by [`ToHost::Hello`], [`ToHost::Past`] and [`ToHost::Progress`], in this order. Changes
-    /// nothing: a job under way continues.
+    /// A host has connected. Answered by [`ToHost::Hello`], [`ToHost::Past`], [`ToHost::Progress`] and
+    /// [`ToHost::Standing`], in this order. Changes nothing: a job under way continues.
     Hello {
         /// [`VERSION`] of the host.
         version: u8,
@@ -53,9 +53,8 @@ pub enum ToBridge<'a> {
     },
     /// Sets how the port is driven, from the next byte on.
     Configure(PortSettings),
-    /// Resets the printer with a pulse on nInit; answered by [`ToHost::Lines`] when that is done. Refused while a job is open. A
-    /// job that was open when the bridge itself was reset, and whose data have not been sent again, is given up as
-    /// [`JobState::Lost`].
+    /// Resets the printer with a pulse on nInit; answered by [`ToHost::Lines`] when that is done. Refused while a job is open, which
+    /// only [`ToBridge::Abandon`] gives up.
     Initialise {
         /// Number of the question, returned with the answer.
         request: u16,
@@ -137,10 +136,10 @@ pub enum Ask {
     /// The printer's own status answer of 38 bytes. Not while a job is open: the question would be row data. Not while the
     /// bridge does not know whether the printer stands between two jobs ([`Answer::Unsure`]).
     Printer,
-    /// The printer's IEEE 1284 device ID. Not while a job is open.
+    /// The printer's IEEE 1284 device ID. As [`Ask::Printer`], since a negotiation may disturb a printer inside a job.
     DeviceId,
-    /// The same as [`Ask::Printer`], by a host that knows that the printer stands between two jobs.
-    PrinterAtRest,
+    /// The same as [`Ask::Printer`]. By this a host once vouched for the printer, and none does any more.
+    Vouched,
     /// The firmware's use of its memory and time. Answered by [`ToHost::Board`].
     Board,
 }

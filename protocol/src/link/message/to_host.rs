@@ -6,7 +6,7 @@
 
 #[cfg(doc)]
 use super::{DATA_MAX, SCHEMA, ToBridge, VERSION};
-use super::{Fault, Lines, PAST, PastJob, Progress, StoredJob};
+use super::{Fault, Lines, PAST, PastJob, Progress, Standing, StoredJob};
 use serde::{Deserialize, Serialize};
 
 /// From the bridge to the workstation.
@@ -91,6 +91,13 @@ pub enum ToHost<'a> {
         /// The job that was asked for, if there is one.
         #[serde(borrow)]
         job: Option<StoredJob<'a>>,
+    },
+    /// Where the printer stands. No byte goes to one of which that is not known but behind a reset.
+    Standing {
+        /// Where.
+        standing: Standing,
+        /// The job of which it has a part, or may have; 0 if there is none.
+        job: u32,
     },
 }
 

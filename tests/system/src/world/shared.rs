@@ -1,50 +1,136 @@
-//! The world for those who live in it: time passes where they wait, and their links are pipes to the board.
+//! The world for those who live in it: each process is a thread, and of all of them and the world one acts at a time.
+//!
+//! A process acts until it waits for something; then the world goes on by a step, and each process that waits looks again. So a
+//! step of one may fall anywhere in another, and the same seed does the same again.
 
-use super::{Burst, Todo, WAYS, World};
+use super::{Burst, Todo, USERS, WAYS, World};
 use crate::chance::Draw;
 use device::connection::transport::Transport;
 use device::connection::{Address, OpenError};
 use std::io;
 use std::panic::resume_unwind;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// The world, for those who live in it.
 #[derive(Clone)]
-pub struct Shared {
-    world: Arc<Mutex<World>>,
-    /// Begins what one of them does next.
+pub struct Shared(Arc<Inner>);
+
+struct Inner {
+    world: Mutex<World>,
+    /// The user whose process acts; none while the world does.
+    acts: Mutex<Option<usize>>,
+    passed: Condvar,
+    threads: Mutex<[Option<JoinHandle<()>>; USERS]>,
+    /// What a process does.
     start: Start,
 }
 
-/// What a user does next, by chance.
-pub type Start = fn(&Shared, usize, Draw);
+/// What a user's process does: by chance, or to bring what is open to its end.
+pub type Start = fn(&Shared, usize, Draw, bool);
 
 /// A process was killed.
 pub struct Killed;
 
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 impl Shared {
-    /// The world, and how those who live in it begin what they do.
+    /// The world, and what those do who live in it.
     pub fn new(world: World, start: Start) -> Shared {
-        Shared { world: Arc::new(Mutex::new(world)), start }
+        Shared(Arc::new(Inner {
+            world: Mutex::new(world),
+            acts: Mutex::new(None),
+            passed: Condvar::new(),
+            threads: Mutex::default(),
+            start,
+        }))
     }
 
-    /// A look at it.
+    /// A look at it, for whoever acts.
     pub fn look(&self) -> MutexGuard<'_, World> {
-        self.world.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.0.world)
     }
 
     /// The world alone again, when nobody lives in it any more.
     pub fn into_world(self) -> Option<World> {
-        Arc::into_inner(self.world).map(|world| world.into_inner().unwrap_or_else(PoisonError::into_inner))
+        Arc::into_inner(self.0).map(|inner| inner.world.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// A step of at most this long.
+    /// A step of at most this long, and what everybody does then.
     pub fn step(&self, most: Duration) {
-        let todo = self.look().turn(most.as_micros() as u64);
+        let (todo, first) = {
+            let mut world = self.look();
+            let most = world.wants.iter().flatten().copied().min().unwrap_or(most);
+            (world.turn(most.as_micros() as u64), world.step as usize)
+        };
         if let Todo::Start(user, draw) = todo {
-            (self.start)(self, user, draw);
+            self.begin(user, draw, false);
         }
+        for user in (0..USERS).map(|at| (first + at) % USERS) {
+            self.act(user);
+        }
+    }
+
+    /// A process of this user begins.
+    pub fn begin(&self, user: usize, draw: Draw, calm: bool) {
+        {
+            let mut world = self.look();
+            (world.runs[user], world.doomed[user]) = (true, false);
+        }
+        let shared = self.clone();
+        let thread = std::thread::spawn(move || {
+            shared.await_turn(user);
+            (shared.0.start)(&shared, user, draw, calm);
+            {
+                let mut world = shared.look();
+                (world.runs[user], world.doomed[user], world.wants[user]) = (false, false, None);
+            }
+            shared.pass(None);
+        });
+        locked(&self.0.threads)[user] = Some(thread);
+    }
+
+    /// Lets a process act until it waits or ends.
+    fn act(&self, user: usize) {
+        if !self.look().runs[user] {
+            return;
+        }
+        self.pass(Some(user));
+        let acts = locked(&self.0.acts);
+        drop(self.0.passed.wait_while(acts, |acts| *acts == Some(user)).unwrap_or_else(PoisonError::into_inner));
+        if !self.look().runs[user]
+            && let Some(thread) = locked(&self.0.threads)[user].take()
+        {
+            let _ = thread.join();
+        }
+    }
+
+    /// Everybody leaves: the world ends.
+    pub fn leave(&self) {
+        self.look().doomed = [true; USERS];
+        (0..USERS).for_each(|user| self.act(user));
+    }
+
+    /// Somebody else acts from now on.
+    fn pass(&self, to: Option<usize>) {
+        *locked(&self.0.acts) = to;
+        self.0.passed.notify_all();
+    }
+
+    fn await_turn(&self, user: usize) {
+        let acts = locked(&self.0.acts);
+        drop(self.0.passed.wait_while(acts, |acts| *acts != Some(user)).unwrap_or_else(PoisonError::into_inner));
+    }
+
+    /// In a user's process: lets a step of at most this long pass.
+    fn wait(&self, user: usize, most: Duration) {
+        self.look().wants[user] = Some(most);
+        self.pass(None);
+        self.await_turn(user);
+        self.live(user);
     }
 
     /// Ends this user's process if it was killed.
@@ -56,8 +142,7 @@ impl Shared {
 
     /// Opens the way of this user.
     pub fn open(&self, user: usize, address: &Address) -> Result<Box<dyn Transport>, OpenError> {
-        self.step(Duration::from_millis(2));
-        self.live(user);
+        self.wait(user, Duration::from_millis(2));
         let mut world = self.look();
         if world.board.is_none() || world.pulled_until > world.now {
             return Err(OpenError::Absent(address.clone()));
@@ -77,8 +162,7 @@ impl Shared {
             if now >= end {
                 return;
             }
-            self.step(Duration::from_micros(end - now));
-            self.live(user);
+            self.wait(user, Duration::from_micros(end - now));
         }
     }
 }
@@ -114,8 +198,7 @@ impl Transport for SimulatedLink {
         let end = self.world.look().now + patience.as_micros() as u64;
         loop {
             let left = end.saturating_sub(self.world.look().now);
-            self.world.step(Duration::from_micros(left));
-            self.world.live(self.user);
+            self.world.wait(self.user, Duration::from_micros(left));
             let mut world = self.world.look();
             if !self.is_open(&world) {
                 return Err(io::ErrorKind::UnexpectedEof.into());

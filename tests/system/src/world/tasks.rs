@@ -1,29 +1,31 @@
-//! A turn of the board's tasks, with the printer at its port and packets and frames at its cable.
+//! A turn of the board's tasks, with the printer at its cable and packets and frames at its other end.
 
-use super::{Down, WAYS, World};
+use super::{Down, MS, WAYS, World};
 use crate::chance::Draw;
 use crate::pool;
 use crate::promises::Promise;
-use bridge::engine::{Outcome as Done, Task};
 use bridge::printer_class::Next;
-use protocol::link::frame::MAX;
-use protocol::link::message::{Answer, Fault, Lines};
+use bridge::standing::{QUESTION, Standing};
+use protocol::link::frame::{self, MAX, Read};
+use protocol::link::message::{Ask, ToBridge};
 
 impl World {
     /// Bursts that are due reach the board, and packets of an operating system.
     pub(super) fn deliver(&mut self) {
-        let Some(board) = &mut self.board else { return self.to_board.clear() };
-        let mut left = Vec::new();
-        for burst in std::mem::take(&mut self.to_board) {
-            if burst.due > self.now {
-                left.push(burst);
-                continue;
-            }
+        if self.board.is_none() {
+            return self.to_board.clear();
+        }
+        let (due, left) = std::mem::take(&mut self.to_board).into_iter().partition(|burst| burst.due <= self.now);
+        self.to_board = left;
+        let due: Vec<super::Burst> = due;
+        for burst in due {
             for packet in burst.bytes.chunks(64) {
+                self.overhear(burst.user, packet);
+                let Some(board) = &mut self.board else { return };
                 board.links.receive(WAYS[burst.user], packet, &mut board.engine);
             }
         }
-        self.to_board = left;
+        let Some(board) = &mut self.board else { return };
         for _ in 0..8 {
             match board.intake.next() {
                 Next::Packet(_) if self.plain.is_some() && self.pulled_until <= self.now => {
@@ -49,11 +51,37 @@ impl World {
         }
     }
 
-    /// The board's tasks, and the printer. The board may go down in the middle of them.
-    pub(super) fn work(&mut self, down: Option<Down>, draw: &mut Draw) {
-        let off = self.printer.off_until > self.now;
-        let paper_out = self.printer.paper_out_until > self.now;
-        let Some(board) = &mut self.board else { return };
+    /// What a host says that could break a promise.
+    fn overhear(&mut self, user: usize, mut bytes: &[u8]) {
+        let mut reader = std::mem::take(&mut self.readers[user]);
+        while let Read::Message(message, rest) = reader.read(bytes) {
+            bytes = rest;
+            match frame::decode::<ToBridge<'_>>(message) {
+                Ok(ToBridge::Ask { what: Ask::Printer, .. }) if self.printer.holds_a_part() => {
+                    self.endanger(Promise::NoQuestionInASheet, QUESTION);
+                    self.endanger(Promise::NothingIntoAnotherSheet, QUESTION);
+                }
+                Ok(ToBridge::Begin { job, .. } | ToBridge::PrintStored { job, .. })
+                    if self.known.get(&job).is_some_and(|known| known.begun > 0) =>
+                {
+                    self.endanger(Promise::NothingTwice, job);
+                }
+                Ok(ToBridge::Cancel { .. }) => self.cancel(),
+                _ => {}
+            }
+        }
+        self.readers[user] = reader;
+    }
+
+    /// The board's tasks, and the printer, for so many µs. The board may go down in the middle of them.
+    pub(super) fn work(&mut self, down: Option<Down>, time_us: u64, draw: &mut Draw) {
+        let status = self.printer.status(self.now);
+        self.cable.answer(&status);
+        let end_ns = self.cable.now() + time_us * 1000;
+        let Some(board) = &mut self.board else {
+            self.cable.pass(time_us * 1000);
+            return;
+        };
         if down == Some(Down::Cut) && draw.one_in_1000(500) {
             self.flash.cut_after(0);
         }
@@ -63,98 +91,71 @@ impl World {
             }
         }
         for _ in 0..1 + draw.below(3) {
-            if !board.alone.poll(&mut board.engine) {
+            if !board.alone.poll(&mut board.engine, self.now) {
                 break;
             }
         }
         if self.flash.is_off() {
             // The supply went while something was written: the board did nothing behind that.
-            self.crossed = None;
             self.ended();
-            return self.stop(Down::Cut, draw);
+            return self.stop(Down::Cut, 0, draw);
         }
-        let task = board.engine.task();
-        let mut violation = None;
-        if let Some(task) = task {
-            match task {
-                Task::Initialise if off => board.engine.done(Done::Done),
-                Task::Initialise => {
-                    self.printer.reset();
-                    board.engine.done(Done::Done);
-                }
-                Task::PrinterStatus if off => {
-                    board.engine.done(Done::Answer(Answer::Stopped(Fault::PowerOff)))
-                }
-                Task::PrinterStatus => {
-                    if self.printer.holds_a_part() {
-                        violation = Some((
-                            Promise::NoQuestionInASheet,
-                            format!(
-                                "asked behind {} bytes of job {:08x}",
-                                self.printer.since.len(),
-                                self.printer.owner
-                            ),
-                        ));
-                    }
-                    let answer = self.printer.status(self.now);
-                    board.engine.done(Done::Answer(Answer::Bytes(&answer)));
-                }
-                Task::DeviceId => {
-                    board.engine.done(Done::Answer(Answer::Bytes(b"\0\x18MANUFACTURER:ALPS;CLS:P;")))
-                }
-                _ => board.engine.done(Done::Done),
-            }
+        // One that goes down does so anywhere in its turn.
+        let end_ns = if down.is_some() { end_ns - draw.below(time_us as usize * 1000) as u64 } else { end_ns };
+        while self.cable.now() < end_ns {
+            self.poll();
+            let left_ns = end_ns.saturating_sub(self.cable.now());
+            let pause_us = self.pause_us.clamp(20, (2 * MS).max(time_us / 4));
+            self.cable.pass(left_ns.min(pause_us * 1000));
+            let number = self.open_job().unwrap_or(QUESTION);
+            self.cross(number);
         }
-        let (lines, fault) = match (off, paper_out) {
-            (true, _) => (Lines(0), Some(Fault::PowerOff)),
-            (_, true) => (Lines(Lines::IDLE.0 | Lines::PAPER_OUT), Some(Fault::PaperOut)),
-            _ => (Lines::IDLE, None),
-        };
-        board.engine.port(lines, fault);
-        let mut crossed = Vec::new();
-        let mut number = 0;
-        if fault.is_none() {
-            let most = 1 + draw.below(self.speed);
-            let output = board.engine.output();
-            crossed.extend_from_slice(&output[..output.len().min(most)]);
-            number = board.engine.open_job().unwrap_or(0);
-            // RUN is pressed while bytes flow: the strobe of the last one is over, and its mark is not made yet.
-            let unmarked = usize::from(down == Some(Down::Run) && draw.one_in_1000(800));
-            board.cross(crossed.len(), unmarked);
-        }
-        if down.is_none() {
-            board.settle(crossed.len());
-        }
-        if let Some((promise, found)) = violation {
-            self.fail(promise, found);
-        }
-        self.take(number, &crossed);
         if let Some(down) = down {
             self.ended();
-            self.stop(down, draw);
-            return;
+            // RUN is pressed while bytes flow: the strobe of the last one is over, and its mark is not made yet.
+            let unmarked = u32::from(down == Down::Run && draw.one_in_1000(800));
+            return self.stop(down, unmarked, draw);
         }
         self.answer();
+        self.look_for_danger();
+    }
+
+    /// A poll of the driver, and what has come of it at the printer.
+    fn poll(&mut self) {
+        let Some(board) = &mut self.board else { return };
+        let (number, before) = (board.engine.open_job(), board.engine.standing());
+        self.pause_us = u64::from(board.poll());
+        // What the processor strobes is a question; what the sender has strobed meanwhile is of the sheet.
+        let number = number.filter(|&number| before == Standing::InSheet(number)).unwrap_or(QUESTION);
+        self.cross(number);
+        if self.cable.resets() != self.resets {
+            self.resets = self.cable.resets();
+            self.lose_part();
+        }
         self.ended();
     }
 
-    /// Bytes of this job reach the printer.
-    fn take(&mut self, number: u32, bytes: &[u8]) {
-        self.crossed = (!bytes.is_empty()).then_some(number);
+    /// What has crossed reaches the printer, as a part of this job.
+    fn cross(&mut self, number: u32) {
+        let bytes = self.cable.drain();
         if bytes.is_empty() {
             return;
         }
-        if self.printer.owner != number || self.printer.since.is_empty() {
-            if self.printer.holds_a_part() {
-                let found = format!(
-                    "job {number:08x} behind {} bytes of job {:08x}",
-                    self.printer.since.len(),
-                    self.printer.owner
-                );
-                self.fail(Promise::NothingIntoAnotherSheet, found);
-            }
+        let is_other = self.printer.owner != number || self.printer.since.is_empty();
+        if is_other && self.printer.holds_a_part() {
+            let promise = match number {
+                QUESTION => Promise::NoQuestionInASheet,
+                _ => Promise::NothingIntoAnotherSheet,
+            };
+            let (owner, count) = (self.printer.owner, self.printer.since.len());
+            self.fail(promise, format!("job {number:08x} behind {count} bytes of job {owner:08x}"));
+        }
+        if is_other {
             self.printer.since.clear();
             self.printer.owner = number;
+            if number != QUESTION {
+                self.last_begun = number;
+            }
             if let Some(known) = self.known.get_mut(&number) {
                 known.begun += 1;
                 if known.begun > 1 {
@@ -163,7 +164,26 @@ impl World {
                 }
             }
         }
-        self.printer.since.extend_from_slice(bytes);
+        self.printer.since.extend_from_slice(&bytes);
+        if number == QUESTION && self.printer.since.len().is_multiple_of(2) {
+            self.printer.since.clear();
+        }
+    }
+
+    /// Notes that a job asks for bytes while the printer has a part of another one.
+    fn look_for_danger(&mut self) {
+        let asks = self.board.as_ref().and_then(|board| {
+            let progress = board.engine.progress();
+            board.engine.open_job().filter(|_| progress.accepted > 0 && board.engine.storing().is_none())
+        });
+        let into = asks.filter(|&number| self.printer.owner != number && !self.printer.since.is_empty());
+        if let Some(number) = into
+            && self.asked_into != into
+            && self.printer.holds_a_part()
+        {
+            self.endanger(Promise::NothingIntoAnotherSheet, number);
+        }
+        self.asked_into = into;
     }
 
     /// What the engine has to say.
@@ -181,13 +201,9 @@ impl World {
         let Some(way) = board.links.speaker() else { return };
         let user = way as usize;
         for frame in said {
-            self.send_to_host(user, frame);
-        }
-    }
-
-    fn send_to_host(&mut self, user: usize, frame: Vec<u8>) {
-        for (due, bytes) in self.carry(frame) {
-            self.to_host[user].push_back((due, bytes));
+            for (due, bytes) in self.carry(frame) {
+                self.to_host[user].push_back((due, bytes));
+            }
         }
     }
 }

@@ -1,9 +1,10 @@
 //! What has to hold when a job ends.
 
 use super::World;
-use crate::promises::Promise;
+use crate::promises::{Promise, State};
 use bridge::engine::LOCAL;
 use bridge::printer_class::End;
+use bridge::standing::Standing;
 use model::is_a_whole_job;
 use protocol::link::message::{ALONE, JobState, Progress};
 
@@ -11,7 +12,8 @@ impl World {
     /// Judges a job that has ended in this step.
     pub(super) fn ended(&mut self) {
         let Some(board) = &self.board else { return };
-        let (after, owes) = (board.engine.progress(), board.engine.owes_reset());
+        let after = board.engine.progress();
+        let owes = matches!(board.engine.standing(), Standing::Unknown { .. });
         let before = std::mem::replace(&mut self.before, after);
         let ends = |progress: &Progress| {
             !matches!(
@@ -24,14 +26,20 @@ impl World {
             )
         };
         let number = after.job;
-        // A job as long as the one before it may begin and end in one step.
-        if !ends(&after) || (before == after && self.crossed != Some(number)) || number == 0 {
+        // Between its first byte and its end the driver looks at least once.
+        if !ends(&after) || before == after || number == 0 {
             return;
         }
         if after.state == JobState::Stored {
             return;
         }
         let part = self.printer.owner == number && !self.printer.since.is_empty();
+        if self.known.get(&number).is_some_and(|known| known.stored) || number == ALONE {
+            let what = (Promise::StoredIsWholeOrBroken, self.door(number), State::InSheet);
+            if part {
+                self.endangered.note(what.0, what.1, what.2);
+            }
+        }
         let expected = self.job(number).map(|job| &job.bytes[..]);
         let since = &self.printer.since;
         let told = format!(

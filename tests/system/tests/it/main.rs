@@ -1,10 +1,16 @@
 //! The whole system under a seed that is drawn anew, and under the seeds that once broke a promise.
 
 use std::time::{Duration, Instant};
+use system::promises::{Promise, Table};
 use system::{report, run};
 
 /// For how long it is tried on an ordinary day; the gate says for how long then.
 const EVERYDAY_SECONDS: u64 = 10;
+
+/// In a minute each promise is endangered so often that it would break; all that can happen has happened in half an hour.
+const MINUTE: u64 = 60;
+const OFTEN: u64 = 100;
+const ALL_SECONDS: u64 = 1_800;
 
 /// `FOILPRESS_SEED` and `FOILPRESS_SECONDS` choose what is tried, and for how long. Without the first the seed is that of the
 /// property tests, which the gate draws from the commit; without either it is drawn from the clock.
@@ -21,10 +27,11 @@ fn every_promise_is_kept_whatever_happens() {
     let time = Duration::from_secs(number("FOILPRESS_SECONDS").unwrap_or(EVERYDAY_SECONDS));
     println!("from seed {first} on, for {time:?}");
     let start = Instant::now();
-    let (mut steps, mut sheets, mut broken) = (0, 0, Vec::new());
+    let (mut steps, mut sheets, mut broken, mut endangered) = (0, 0, Vec::new(), Table::default());
     for seed in first.. {
         let found = run(seed, None);
         (steps, sheets) = (steps + found.steps, sheets + found.sheets);
+        endangered.add(&found.endangered);
         if found.broken.is_some() {
             println!("after {steps} steps in all, {:?}:\n{}", start.elapsed(), report(seed, &found));
             broken.push(seed);
@@ -34,7 +41,16 @@ fn every_promise_is_kept_whatever_happens() {
             break;
         }
     }
+    println!("{}", endangered.text());
     assert!(broken.is_empty(), "promises were broken under {broken:?}");
+    if time >= Duration::from_secs(MINUTE) {
+        for promise in Promise::ALL {
+            assert!(endangered.total(promise) >= OFTEN, "{promise:?} was hardly endangered");
+        }
+    }
+    if time >= Duration::from_secs(ALL_SECONDS) {
+        assert_eq!(endangered.gaps(), Vec::<String>::new());
+    }
 }
 
 /// All sources of tests in a folder.

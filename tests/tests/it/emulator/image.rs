@@ -43,6 +43,7 @@ scripts!(
     restart,
     #[ignore = "real time: cargo xtask test --full"]
     speed,
+    standing,
     #[ignore = "real time: cargo xtask test --full"]
     windows,
     #[ignore = "real time: cargo xtask test --full"]

@@ -6,7 +6,7 @@
 //! | word | the user sees |
 //! |---|---|
 //! | sent | the job was sent whole |
-//! | unknown, lost | the bridge no longer knows the job; the sheet is lost |
+//! | lost | the sheet is lost |
 //! | held | the queue holds the job until it is released |
 //! | refused | nothing is sent before the printer was reset |
 //! | busy | the bridge has another job; this one is kept |
@@ -28,7 +28,6 @@
 //! reset a printer that was switched on again before the first story was told.
 
 use super::process::random_job;
-use device::printers::{Printer, Printers};
 use device::transit::journal::{Journal, NewJob};
 use foilpress_tests::served::{Bridge, Port};
 use observe::Silent;
@@ -84,12 +83,12 @@ const CALLERS: [Caller; 5] = [Send, Print, Resume, Queue, TwoUsers];
 #[rustfmt::skip]
 const TABLE: [(Fault, [&str; 5]); 12] = [
     //                          send                               print --to                         resume                             queue                          two users
-    (BridgeForgets,            ["unknown ½, refused ½, sent ½R1",  "unknown ½, refused ½, sent ½R1",  "unknown ½, refused ½, sent ½R1",  "held ½, held ½, sent ½R1",    "unknown ½, refused ½, sent ½R1"]),
+    (BridgeForgets,            ["lost ½, refused ½, sent ½R1",  "lost ½, refused ½, sent ½R1",  "lost ½, refused ½, sent ½R1",  "held ½, held ½, sent ½R1",    "lost ½, refused ½, sent ½R1"]),
     (RestartBetweenSheets,     ["sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",             "sent 1, sent 11"]),
     (KilledBeforeTheFirstByte, ["killed 0, sent 1",                "killed 0, sent 1",                "killed 0, sent 1",                "killed 0, sent 1",            "killed 0, busy 0, sent 11 | killed 0, sent 11"]),
     (KilledInARow,             ["killed ½, sent 1",                "killed ½, sent 1",                "killed ½, sent 1",                "killed ½, sent 1",            "killed ½, busy ½, sent 11 | killed ½, sent 11"]),
     (KilledAtTheEnd,           ["killed 1, sent 1",                "killed 1, sent 1",                "killed 1, sent 1",                "killed 1, sent 1",            "killed 1, sent 11"]),
-    (KilledAndForgotten,       ["killed ½, unknown ½, refused ½, sent ½R1", "killed ½, unknown ½, refused ½, sent ½R1", "killed ½, unknown ½, refused ½, sent ½R1", "killed ½, held ½, sent ½R1", "killed ½, refused ½, sent ½R1"]),
+    (KilledAndForgotten,       ["killed ½, lost ½, refused ½, sent ½R1", "killed ½, lost ½, refused ½, sent ½R1", "killed ½, lost ½, refused ½, sent ½R1", "killed ½, held ½, sent ½R1", "killed ½, refused ½, sent ½R1"]),
     (LinkLostAndBack,          ["sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",             "sent 1, sent 11"]),
     (PaperOut,                 ["sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",             "sent 1, sent 11"]),
     (SwitchedOff,              ["lost ½, sent ½R1 | lost ½R, sent ½R1", "lost ½, sent ½R1 | lost ½R, sent ½R1", "lost ½, sent ½R1 | lost ½R, sent ½R1", "held ½, sent ½R1 | held ½R, sent ½R1", "lost ½, sent ½R1 | lost ½R, sent ½R1"]),
@@ -324,8 +323,8 @@ impl Bench {
         match fault {
             RestartBetweenSheets => {}
             ResetOwedByAnother => {
-                let printers = Printers::at(&self.path("printers")).unwrap();
-                printers.begin(&Printer::Bridge(7), "deadbeef", None).unwrap();
+                self.bridge.port.tear(0xdead_beef);
+                self.bridge.strike(|port| &port.forget);
             }
             PaperOut | KilledBeforeTheFirstByte => self.set(|port| &port.paper, false),
             _ => self.set(|port| &port.busy, true),
@@ -488,7 +487,6 @@ impl Run {
             (_, Some(0)) if has(": cancelled; the sheet comes out unfinished") => "cancelled",
             (Send | Print | Resume | TwoUsers, Some(0)) if has("the printer has taken all") => "sent",
             (_, Some(1)) if has("bridge reset --to unix:") && has("may hold part of job") => "refused",
-            (_, Some(1)) if has("no longer knows this job") => "unknown",
             (_, Some(1)) if has("the sheet is lost") => "lost",
             (_, Some(1)) if has("is kept") && has("is printing another job") => "busy",
             _ => panic!("{caller:?} ended with {code:?}: {said}"),

@@ -3,7 +3,7 @@
 
 use bridge::engine::{Checkpoint, Engine, Identity, Outcome as Done, Task};
 use device::transit::session::{Outcome, Record, Session, SessionError};
-use model::{Board, Damages, Job, Mischief, chance, damage};
+use model::{Board, Damages, Job, Mischief, chance, damage, rested};
 use protocol::link::frame::{MAX, Reader};
 use protocol::link::message::{Answer, Fault, Lines};
 use rand::RngExt;
@@ -169,7 +169,7 @@ impl<'j> World<'j> {
         self.boot += 1;
         self.engine = Some(match self.checkpoint {
             Some(checkpoint) => Engine::resume(memory, identity(self.boot), checkpoint),
-            None => Engine::new(memory, identity(self.boot)),
+            None => rested(memory, identity(self.boot)),
         });
         self.reader.reset();
     }

@@ -4,16 +4,14 @@ use std::time::Duration;
 
 use anyhow::{Result, anyhow};
 use indicatif::HumanBytes;
-use protocol::link::message::{Fault, JobState, Lines, PastJob, Progress, Usage};
+use protocol::link::message::{Ask, Fault, JobState, Lines, PastJob, Progress, Standing, Usage};
 use serde_json::json;
 
 use device::connection::Address;
 use device::connection::Bridge;
 use device::connection::find::{self, Candidate};
 use device::connection::transport::Transport;
-use device::deliver::ask::{self, Negotiate};
 use device::flash::installed;
-use device::printers::Printers;
 use device::questions::query::{Query, Reply, Shelf, is_alps};
 use device::questions::status::Status;
 use device::transit::words;
@@ -87,6 +85,8 @@ pub struct Found {
     pub bridge: Bridge,
     /// Its job.
     pub progress: Progress,
+    /// Where the printer stands, and the job of which it has or may have a part.
+    pub standing: (Standing, u32),
     /// The lines of its port.
     pub lines: Lines,
     /// The fault that the lines show.
@@ -104,31 +104,33 @@ pub struct Found {
 }
 
 impl Found {
-    /// Asks bridge and printer. The printer is asked only while no job is open; a bridge that prints says so instead.
-    pub fn ask(address: &Address, negotiate: Negotiate) -> Result<Found> {
-        Found::ask_on(&mut *address.open()?, negotiate)
+    /// Asks bridge and, unless `quiet`, the printer. It is asked only while no job is open; a bridge that prints says so instead.
+    pub fn ask(address: &Address, quiet: bool) -> Result<Found> {
+        Found::ask_on(&mut *address.open()?, quiet)
     }
 
     /// The same on a link that is open.
-    pub fn ask_on(link: &mut dyn Transport, negotiate: Negotiate) -> Result<Found> {
-        let printers = Printers::of_system()?;
+    pub fn ask_on(link: &mut dyn Transport, quiet: bool) -> Result<Found> {
         let mut query = Query::new(link, PATIENCE)?;
         let mut found = Found::of_bridge(&mut query)?;
-        let stopped = found.fault.map(Reply::Stopped);
-        found.device_id = match &stopped {
-            Some(stopped) => stopped.clone(),
-            None => ask::device_id(&mut query, &printers, negotiate, PRINTER_PATIENCE)?,
-        };
-        found.status = match stopped {
-            Some(stopped) => stopped,
-            None => ask::status(&mut query, &printers, negotiate, PRINTER_PATIENCE)?,
-        };
+        found.device_id = found.printer(&mut query, Ask::DeviceId, quiet)?;
+        found.status = found.printer(&mut query, Ask::Printer, quiet)?;
         // A job may have ended meanwhile, between two of these answers.
         found.progress = query.ask_progress(PATIENCE)?;
         if found.status == Reply::NotNow && !found.progress.is_open() {
-            found.status = ask::status(&mut query, &printers, negotiate, PRINTER_PATIENCE)?;
+            found.status = found.printer(&mut query, Ask::Printer, quiet)?;
         }
+        found.standing = query.standing();
         Ok(found)
+    }
+
+    /// Asks the printer something, if it takes bytes.
+    pub fn printer(&self, query: &mut Query<'_>, what: Ask, quiet: bool) -> Result<Reply> {
+        Ok(match self.fault {
+            Some(fault) => Reply::Stopped(fault),
+            None if quiet => Reply::NotAsked,
+            None => query.printer(what, PRINTER_PATIENCE)?,
+        })
     }
 
     /// What the bridge itself knows, before the printer is asked.
@@ -137,6 +139,7 @@ impl Found {
         Ok(Found {
             bridge: query.bridge().clone(),
             progress: *query.progress(),
+            standing: query.standing(),
             lines,
             fault,
             device_id: Reply::NotNow,
@@ -160,6 +163,11 @@ impl Found {
             "firmware": { "memory": self.usage.fixed, "stack": self.usage.stack, "stack_used": self.usage.stack_used,
                           "longest_us": self.usage.longest_us },
             "stored": { "jobs": self.shelf.jobs.len(), "room": self.shelf.room, "total": self.shelf.total },
+            "printer_stands": { "where": match self.standing.0 {
+                Standing::AT_REST => "between jobs",
+                Standing::IN_SHEET => "in a sheet",
+                _ => "unknown",
+            }, "job": self.standing.1 },
             "lines_high": levels(self.lines),
             "fault": self.fault.map(|fault| words::fault(fault, None)),
             "device_id": self.device_id.device_id(),
@@ -212,11 +220,7 @@ impl Found {
             },
             Reply::NotNow => writeln!(out, "printer: not asked, because a job is open")?,
             Reply::NotAsked => writeln!(out, "printer: not asked")?,
-            Reply::Unsure => writeln!(
-                out,
-                "printer: not asked, because it may be inside a job that the bridge has forgotten; `foilpress bridge reset` makes \
-                 it ready"
-            )?,
+            Reply::Unsure => writeln!(out, "printer: not asked, because {}", unsure(self.standing.1))?,
             Reply::OneWay => writeln!(out, "printer: its port is one-way, so it cannot be asked")?,
             Reply::Silent => writeln!(out, "printer: did not answer in time")?,
             Reply::Stopped(_) => writeln!(out, "printer: cannot be asked at the moment")?,
@@ -231,6 +235,18 @@ impl Found {
             f64::from(longest_us) / 1000.0
         )?;
         Ok(())
+    }
+}
+
+/// Why a printer of which its bridge does not know where it stands is not asked.
+fn unsure(job: u32) -> String {
+    match job {
+        0 => "the bridge has not seen what it did before; it is reset before the next job, or by `foilpress bridge reset`, and then \
+              it can be asked"
+            .into(),
+        job => format!(
+            "it may hold part of job {job:08x}; take the sheet out, and `foilpress bridge reset` makes it ready"
+        ),
     }
 }
 
@@ -264,5 +280,5 @@ fn ended(state: JobState) -> &'static str {
 /// What a bridge answers on the first of its addresses that can be opened.
 pub fn ask(candidate: &Candidate) -> Result<Found> {
     let (_, mut link) = candidate.open()?;
-    Found::ask_on(&mut *link, Negotiate::Known)
+    Found::ask_on(&mut *link, false)
 }

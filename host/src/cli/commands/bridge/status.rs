@@ -9,14 +9,13 @@ use super::found::{Found, named_or_only};
 use super::watch;
 use crate::cli::console::stdout;
 use device::connection::Address;
-use device::deliver::ask::Negotiate;
 
 /// Arguments of `bridge status`.
 #[derive(ClapArgs, Debug)]
 #[command(
     after_help = "Examples:\n  foilpress bridge status\n  foilpress bridge status --no-negotiate   (an old printer)\n\n\
     To ask the printer, the bridge negotiates with it as IEEE 1284 describes, which may take a printer of before 1994 off line. A \
-    printer that has not answered a negotiation is not asked again by other commands."
+    printer that has not answered a negotiation is not asked again before it was switched off or reset."
 )]
 pub struct Args {
     /// Address of the bridge [default: the only one]
@@ -36,11 +35,10 @@ pub struct Args {
 /// Runs `bridge status`.
 pub fn run(args: &Args) -> Result<()> {
     let address = named_or_only(args.to.as_ref())?;
-    let negotiate = if args.no_negotiate { Negotiate::Never } else { Negotiate::Again };
     if args.watch {
-        return watch::run(&address, args.json, negotiate);
+        return watch::run(&address, args.json, args.no_negotiate);
     }
-    let found = Found::ask(&address, negotiate)?;
+    let found = Found::ask(&address, args.no_negotiate)?;
     let mut out = stdout();
     if args.json {
         writeln!(out, "{}", serde_json::to_string_pretty(&found.json())?)?;

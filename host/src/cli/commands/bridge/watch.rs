@@ -6,14 +6,13 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use console::Term;
+use protocol::link::message::Ask;
 use serde_json::json;
 
-use super::found::{Found, PATIENCE, PRINTER_PATIENCE};
+use super::found::{Found, PATIENCE};
 use crate::cli::console::{chain, draw, stdout};
 use device::connection::Address;
 use device::connection::transport::Transport;
-use device::deliver::ask::{self, Negotiate};
-use device::printers::Printers;
 use device::questions::query::{Query, Reply};
 use observe::visible;
 
@@ -75,13 +74,12 @@ impl Screen {
 }
 
 /// Shows bridge and printer for ever. Waits for a bridge that goes away, once it has been connected.
-pub fn run(address: &Address, json: bool, negotiate: Negotiate) -> Result<()> {
-    let printers = Printers::of_system()?;
+pub fn run(address: &Address, json: bool, quiet: bool) -> Result<()> {
     let mut screen = Screen { json, terminal: stdout().is_terminal() && !json, shown: String::new() };
     let mut been = false;
     loop {
         let met = match address.open() {
-            Ok(mut link) => follow(&mut *link, &printers, negotiate, &mut screen, &mut been),
+            Ok(mut link) => follow(&mut *link, quiet, &mut screen, &mut been),
             Err(error) => Err(error.into()),
         };
         match met {
@@ -98,8 +96,7 @@ pub fn run(address: &Address, json: bool, negotiate: Negotiate) -> Result<()> {
 /// Follows one connection until it fails. An error of standard output is an [`std::io::Error`].
 fn follow(
     link: &mut dyn Transport,
-    printers: &Printers,
-    negotiate: Negotiate,
+    quiet: bool,
     screen: &mut Screen,
     been: &mut bool,
 ) -> Result<std::convert::Infallible> {
@@ -113,9 +110,9 @@ fn follow(
             (None, true) => found.status = Reply::NotNow,
             (None, false) if asked.is_none_or(|at| at.elapsed() >= ASK) => {
                 if !matches!(found.device_id, Reply::Bytes(_) | Reply::OneWay) {
-                    found.device_id = ask::device_id(&mut query, printers, negotiate, PRINTER_PATIENCE)?;
+                    found.device_id = found.printer(&mut query, Ask::DeviceId, quiet)?;
                 }
-                found.status = ask::status(&mut query, printers, negotiate, PRINTER_PATIENCE)?;
+                found.status = found.printer(&mut query, Ask::Printer, quiet)?;
                 asked = Some(Instant::now());
             }
             (None, false) => {}
@@ -123,6 +120,7 @@ fn follow(
         screen.show_found(&found)?;
         sleep(POLL);
         found.progress = query.ask_progress(PATIENCE)?;
+        found.standing = query.standing();
         (found.lines, found.fault) = query.lines(PATIENCE)?;
     }
 }
