@@ -1,23 +1,29 @@
 //! Storing jobs, and printing them with no host: what stands between the engine and the [`Store`].
 //!
-//! Problem: a job goes from the link into the flash, and from there to the printer, and the supply may go at any instant of either.
-//! Nothing may be lost but the sheet in the rollers, and a printer that waits for the rest of a row has to be reset before anything
-//! else goes to it, whoever comes next and however long the supply was away.
-//! Method: a poll does one thing at most: it answers a question, writes a page, or reads one. Storing goes on only while
-//! nothing is printed, because the flash cannot be read while it is written, and the processor stands still for that long.
-//! Printing, whatever the job and its way, writes to the flash twice: before the first byte, and when the job has ended. So the printer's
-//! state after a loss of the supply is known from the [diary](crate::store), and after any other reset from memory, to the byte
-//! ([`crate::checkpoint`]); then the engine gets the data of a stored job once more and leaves out what has crossed.
-//! A store whose host is silent is dropped after [`SILENCE_US`], since it cannot be resumed and keeps all others waiting.
+//! Problem: a job goes from the link into the flash, and from there to the printer, and the supply may go at
+//! any instant of either.
+//! Nothing may be lost but the sheet in the rollers, and a printer that waits for the rest of a row has to be
+//! reset before anything else goes to it, whoever comes next and however long the supply was away.
+//! Method: a poll does one thing at most: it answers a question, writes a page, or reads one. Storing goes on
+//! only while nothing is printed, because the flash cannot be read while it is written, and the processor
+//! stands still for that long.
+//! Printing, whatever the job and its way, writes to the flash twice: before the first byte, and when the job
+//! has ended. So the printer's state after a loss of the supply is known from the [diary](crate::store), and
+//! after any other reset from memory, to the byte ([`crate::checkpoint`]); then the engine gets the data of a
+//! stored job once more and leaves out what has crossed.
+//! A store whose host is silent is dropped after [`SILENCE_US`], since it cannot be resumed and keeps all
+//! others waiting.
 //! Cost: a poll that writes takes as long as the flash does; all others stay well below a millisecond.
-//! Limits: if the supply goes between the last byte of a job and the note that it has ended, some milliseconds, the sheet counts as lost.
+//! Limits: if the supply goes between the last byte of a job and the note that it has ended, some
+//! milliseconds, the sheet counts as lost.
 
 use crate::engine::{Engine, Request};
 use crate::standing::Standing;
 use crate::store::{End, Flash, Next, PAGE_DATA, Reading, Record, Store, Stored, Worn};
 use protocol::link::message::{ALONE, JobState, Refusal, StoredJob};
 
-/// For how long the host of a job that is being stored may say nothing of it. Source: `docs/decisions/print-alone.md`.
+/// For how long the host of a job that is being stored may say nothing of it. Source:
+/// `docs/decisions/print-alone.md`.
 pub const SILENCE_US: u64 = 30_000_000;
 
 /// The store, its diary, and the job that is printed from it.
@@ -36,8 +42,8 @@ struct Run {
 }
 
 impl<F: Flash> Alone<F> {
-    /// Finds what is in the flash, and tells the engine what it has to know of it. `remembers` says whether the engine continues
-    /// from a checkpoint, which then knows better. To be called before anything is sent.
+    /// Finds what is in the flash, and tells the engine what it has to know of it. `remembers` says whether
+    /// the engine continues from a checkpoint, which then knows better. To be called before anything is sent.
     pub fn open(flash: F, engine: &mut Engine<'_>, remembers: bool) -> Self {
         let store = Store::open(flash);
         let mut alone = Alone { store, run: None, heard: (0, 0) };
@@ -92,7 +98,9 @@ impl<F: Flash> Alone<F> {
                 }
             },
             // A record without an end says so already.
-            (None, Standing::Unknown { job, .. }) if self.store.noted().is_some_and(|last| last.end.is_some()) => {
+            (None, Standing::Unknown { job, .. })
+                if self.store.noted().is_some_and(|last| last.end.is_some()) =>
+            {
                 self.store.note_begin(job, 0);
             }
             (None, Standing::Unknown { .. }) => {}

@@ -1,13 +1,15 @@
 //! Where the printer stands: between two jobs, in a sheet, or nobody knows.
 //!
-//! Problem: a printer that has a part of a sheet takes whatever comes next as the rest of a row, and prints it as text. It forgets that
-//! part when it is switched off, and keeps it when only a cable is pulled; a board that has lost its supply has seen neither.
-//! Method: one value and a method for each event that changes it. Bytes of a job leave only [in that job's sheet](Standing::InSheet),
-//! which is entered [between two jobs](Standing::AtRest) and from nowhere else; and a printer is known to be between two jobs by
-//! two events alone: a reset that it has noticed, and the legal end of a job. The status question is a job of two bytes, number
-//! [`QUESTION`].
+//! Problem: a printer that has a part of a sheet takes whatever comes next as the rest of a row, and prints
+//! it as text. It forgets that part when it is switched off, and keeps it when only a cable is pulled; a
+//! board that has lost its supply has seen neither.
+//! Method: one value and a method for each event that changes it. Bytes of a job leave only [in that job's
+//! sheet](Standing::InSheet), which is entered [between two jobs](Standing::AtRest) and from nowhere else;
+//! and a printer is known to be between two jobs by two events alone: a reset that it has noticed, and the
+//! legal end of a job. The status question is a job of two bytes, number [`QUESTION`].
 //!
-//! Cost: eight bytes. Limits: what another computer does with this printer while the board has no supply it does not see.
+//! Cost: eight bytes. Limits: what another computer does with this printer while the board has no supply it
+//! does not see.
 //! Source: `docs/decisions/where-the-printer-stands.md`.
 
 use protocol::link::message::Standing as Told;
@@ -23,7 +25,8 @@ pub enum Standing {
     Unknown {
         /// The job of which it may have a part, or 0.
         job: u32,
-        /// The board has seen that job being lost: the printer is reset as soon as it can notice. Otherwise before the next byte.
+        /// The board has seen that job being lost: the printer is reset as soon as it can notice. Otherwise
+        /// before the next byte.
         due: bool,
     },
     /// Between two jobs.

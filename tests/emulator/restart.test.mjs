@@ -120,18 +120,18 @@ test('a plain job that a restart cut in two is lost, and the printer is reset be
   same(bench.printer.taken, bytes);
 });
 
-test('without its memory the board does not pretend: no job is known', { skip }, async () => {
+test('without its memory the board says by its diary which sheet was lost', { skip }, async () => {
   let bench = new Bench();
   await bench.connect('bulk');
   const bytes = job('small.rgl');
   await bench.print(3, RAW, bytes, { until: () => bench.printer.taken.length >= 3000 });
   bench = bench.restarted(false);
-  const { state, printed } = await standing(bench, 0);
-  assert.deepEqual([state, printed], ['none', 0]);
+  const { state, printed } = await standing(bench, 3);
+  assert.deepEqual([state, printed], ['lost', 0]);
   // What stands in that memory after the supply was away is anything.
   bench = bench.restarted();
   for (let i = 0; i < bench.board.chip.sram.length; i++) bench.board.chip.sram[i] = (i * 73 + (i >> 7)) & 255;
-  assert.equal((await standing(bench, 0)).state, 'none');
+  assert.equal((await standing(bench, 3)).state, 'lost');
 });
 
 test('the log is read from any byte on, says what is gone, and goes on after a restart', { skip }, async () => {

@@ -1,10 +1,13 @@
-//! `cargo xtask firmware`: the bridge's images, one for each board, and the rig's; and whether they are as small as they are to be.
+//! `cargo xtask firmware`: the bridge's images, one for each board, and the rig's; and whether they are as
+//! small as they are to be.
 //!
-//! Where the toolchain has clippy, the images are compiled by it, for it makes the same code as the compiler and checks the sources
-//! on the way: checking them by themselves would compile everything below them a second time.
+//! Where the toolchain has clippy, the images are compiled by it, for it makes the same code as the compiler
+//! and checks the sources on the way: checking them by themselves would compile everything below them a
+//! second time.
 //!
-//! A release's images are the same bytes wherever they are built. The bridge's library lies outside of the firmware's workspace, and what the
-//! compiler calls it depends on the whole path: so the sources are reached by a link that has one place everywhere.
+//! A release's images are the same bytes wherever they are built. The bridge's library lies outside of the
+//! firmware's workspace, and what the compiler calls it depends on the whole path: so the sources are reached
+//! by a link that has one place everywhere.
 
 use crate::{cargo, cargo_home, command, elf, succeed, tools};
 use anyhow::{Context, Result, bail};
@@ -95,7 +98,8 @@ pub fn build(root: &Path) -> Result<PathBuf> {
     build_for(pico, root, None)
 }
 
-/// Builds the images of the bridge and of the rig that the installed targets allow, and names what is missing. None at all is a failure.
+/// Builds the images of the bridge and of the rig that the installed targets allow, and names what is
+/// missing. None at all is a failure.
 pub fn build_possible(root: &Path) -> Result<()> {
     let sysroot = command("rustc", &["--print", "sysroot"]).output().context("there is no rustc")?.stdout;
     let targets = Path::new(String::from_utf8(sysroot)?.trim()).join("lib/rustlib");

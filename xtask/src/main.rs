@@ -43,7 +43,8 @@ enum Task {
     },
     /// Run the benchmarks
     Bench,
-    /// Build the firmware that the installed targets allow as UF2 and check its size against xtask/budgets.toml
+    /// Build the firmware that the installed targets allow as UF2 and check its size against
+    /// xtask/budgets.toml
     Firmware,
     /// Change each decision of the bridge once, and say which of the changes no test notices: some hours
     Mutants {

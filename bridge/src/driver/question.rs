@@ -1,15 +1,18 @@
 //! The status question: two bytes to the printer, 38 bytes back.
 //!
-//! Problem: a printer may be at work when it is asked, takes its time with the answer, may send it in pieces, and may
-//! send nothing. To one that cannot answer the question is two bytes of text. Method: a state machine that says what to do next
-//! and is told what came of it. Unless the printer is known to negotiate, that is tried first, and what it still had to say is
-//! dropped. Then the question is offered until the printer has taken both bytes, and nibble mode read until the answer is
-//! complete, with a pause between any two attempts. Cost: an attempt to write is one poll of the port's 50 µs; one to read
-//! goes on for as many polls as the printer takes.
+//! Problem: a printer may be at work when it is asked, takes its time with the answer, may send it in pieces,
+//! and may send nothing. To one that cannot answer the question is two bytes of text. Method: a state machine
+//! that says what to do next and is told what came of it. Unless the printer is known to negotiate, that is
+//! tried first, and what it still had to say is dropped. Then the question is offered until the printer has
+//! taken both bytes, and nibble mode read until the answer is complete, with a pause between any two
+//! attempts. Cost: an attempt to write is one poll of the port's 50 µs; one to read goes on for as many polls
+//! as the printer takes.
 //!
-//! Limits: an answer of fewer than 38 bytes is none. That goes for a single byte, too: what a printer means by one on
-//! this port is not known. A printer that stops inside a byte is taken at its word, and what came is passed on.
-//! A printer that shows a fault before it has taken both bytes is left with half a question, and has to be reset.
+//! Limits: an answer of fewer than 38 bytes is none. That goes for a single byte, too: what a printer means
+//! by one on this port is not known. A printer that stops inside a byte is taken at its word, and what came
+//! is passed on.
+//! A printer that shows a fault before it has taken both bytes is left with half a question, and has to be
+//! reset.
 
 use crate::port::{ReverseError, Stop, Written};
 use heapless::Vec;
@@ -107,8 +110,8 @@ impl StatusQuestion {
         &self.so_far
     }
 
-    /// The bytes of [`Step::Write`] were offered to the printer; the attempt ended at `now_us`. Returns the end of the
-    /// question, if this is it.
+    /// The bytes of [`Step::Write`] were offered to the printer; the attempt ended at `now_us`. Returns the
+    /// end of the question, if this is it.
     pub(crate) fn written(&mut self, written: Written, now_us: u64) -> Option<Outcome> {
         self.taken += written.count;
         self.due_us = now_us + PAUSE_US;
@@ -120,7 +123,8 @@ impl StatusQuestion {
         None
     }
 
-    /// By now this much of the answer has come, what had come before included, and reading ended so; the attempt ended at
+    /// By now this much of the answer has come, what had come before included, and reading ended so; the
+    /// attempt ended at
     /// `now_us`. Returns the end of the question, if this is it.
     pub(crate) fn read(&mut self, come: &[u8], error: Option<ReverseError>, now_us: u64) -> Option<Outcome> {
         if !self.talks && matches!(error, None | Some(ReverseError::Silent(_))) {
@@ -182,8 +186,9 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever the printer does, the question ends within its time, puts its two bytes once and in order, reads only
-        /// behind them, and has an answer exactly if 38 bytes came or the printer stopped behind some.
+        /// Whatever the printer does, the question ends within its time, puts its two bytes once and in
+        /// order, reads only behind them, and has an answer exactly if 38 bytes came or the printer stopped
+        /// behind some.
         #[test]
         fn every_question_comes_to_an_end(reactions in reactions(), took_us in 0u64..45_000) {
             let (mut now, mut question) = (7u64, StatusQuestion::new(7, true));

@@ -1,13 +1,13 @@
 //! A printer, its cable and the board in front of it, in virtual time.
 //!
-//! [`SimulatedPort`] holds all lines and a clock. Its pins implement the `embedded-hal` traits; looking at a pin
-//! and waiting are what makes time pass, so a test sees every edge with its time to the nanosecond and minutes
-//! of an operator's absence cost nothing. The printer's side reacts as IEEE 1284 describes, with times of its own;
-//! bytes it has taken, what it would send back and every edge on the way can be looked at afterwards.
-//! [`SimulatedBoard`] is what the driver needs beside the pins.
+//! [`SimulatedPort`] holds all lines and a clock. Its pins implement the `embedded-hal` traits; looking at a
+//! pin and waiting are what makes time pass, so a test sees every edge with its time to the nanosecond and
+//! minutes of an operator's absence cost nothing. The printer's side reacts as IEEE 1284 describes, with
+//! times of its own; bytes it has taken, what it would send back and every edge on the way can be looked at
+//! afterwards. [`SimulatedBoard`] is what the driver needs beside the pins.
 //!
-//! Where millions of bytes cross, [`SimulatedPort::quick`] lets the sender's bytes cross by their number: the same bytes at the same
-//! levels, without an edge for each.
+//! Where millions of bytes cross, [`SimulatedPort::quick`] lets the sender's bytes cross by their number: the
+//! same bytes at the same levels, without an edge for each.
 //!
 //! Limits: edges are ideal, no analogue behaviour of a cable is modelled.
 

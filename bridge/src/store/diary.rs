@@ -1,11 +1,15 @@
 //! Which sheet the printer was in when the supply went, in two sectors.
 //!
-//! Problem: a board loses its memory with its supply, perhaps in the middle of a sheet, and whoever comes next must not print into it.
-//! Method: a record a job. It is programmed before the job's first byte leaves, with its last word left blank, and the end of the job,
-//! or the reset that follows a lost one, programs that word: flash clears bits without an erase. The last record counts. One whose
-//! end is missing says that the printer may have a part of its job; one that is torn, aged or worn says that nobody knows. The other sector is erased ahead, between jobs, so
-//! before a first byte stands one page program. What cannot be written is erased, since no record says nothing either.
-//! Cost: 32 bytes and two programs a job, one erase in 128 jobs. Limits: a question to the printer is noted only when it stays half put.
+//! Problem: a board loses its memory with its supply, perhaps in the middle of a sheet, and whoever comes
+//! next must not print into it.
+//! Method: a record a job. It is programmed before the job's first byte leaves, with its last word left
+//! blank, and the end of the job, or the reset that follows a lost one, programs that word: flash clears bits
+//! without an erase. The last record counts. One whose end is missing says that the printer may have a part
+//! of its job; one that is torn, aged or worn says that nobody knows. The other sector is erased ahead,
+//! between jobs, so before a first byte stands one page program. What cannot be written is erased, since no
+//! record says nothing either.
+//! Cost: 32 bytes and two programs a job, one erase in 128 jobs. Limits: a question to the printer is noted
+//! only when it stays half put.
 
 use super::NUMBERS;
 use super::flash::{Flash, PAGE, SECTOR};

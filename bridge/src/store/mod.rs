@@ -146,8 +146,7 @@ impl<F: Flash> Store<F> {
     pub fn open(flash: F) -> Self {
         let sectors = (flash.size() / SECTOR).saturating_sub(diary::SECTORS);
         let diary = Diary::open(&flash);
-        let mut store =
-            Store { flash, diary, sectors, jobs: Vec::new(), sequence: 1, next: 0, draft: None };
+        let mut store = Store { flash, diary, sectors, jobs: Vec::new(), sequence: 1, next: 0, draft: None };
         for sector in 0..sectors {
             let Some(head) = store.head(sector) else { continue };
             if head.sequence >= store.sequence {

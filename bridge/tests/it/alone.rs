@@ -1,5 +1,6 @@
-//! Storing, and printing with no host, while the supply goes anywhere. What crosses the port is parsed: nothing is lost but the sheet
-//! in the rollers, nothing is printed twice or behind a part of something else, and the store holds the old or the new state.
+//! Storing, and printing with no host, while the supply goes anywhere. What crosses the port is parsed:
+//! nothing is lost but the sheet in the rollers, nothing is printed twice or behind a part of something else,
+//! and the store holds the old or the new state.
 
 use bridge::alone::{Alone, SILENCE_US};
 use bridge::button::Press;
@@ -10,8 +11,8 @@ use model::flash::ModelFlash;
 use model::{Board, IDENTITY, Job, framed, is_a_whole_job, seeded};
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
-    ALONE, DATA_MAX, DefectKind, Fault, JobKind, JobState, LOCAL, Lines, PastJob, Progress, Refusal, StoredJob,
-    ToBridge, ToHost,
+    ALONE, DATA_MAX, DefectKind, Fault, JobKind, JobState, LOCAL, Lines, PastJob, Progress, Refusal,
+    StoredJob, ToBridge, ToHost,
 };
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -222,7 +223,8 @@ fn a_thousand_cuts_cost_nothing_but_the_sheet_in_the_rollers() {
                         }
                     }
                     printer.serve(&mut bridge.engine, random.random_range(0..3000));
-                    // The board restarts by itself now and then. Only a job of the link waits for its host then.
+                    // The board restarts by itself now and then. Only a job of the link waits for its host
+                    // then.
                     if random.random_ratio(1, 300) && deed != Deed::Link {
                         warm += 1;
                         let before = bridge.engine.checkpoint();

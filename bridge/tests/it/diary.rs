@@ -1,4 +1,5 @@
-//! The diary: what is left in the flash of which sheet the printer was in, whatever the supply, age and wear do to it.
+//! The diary: what is left in the flash of which sheet the printer was in, whatever the supply, age and wear
+//! do to it.
 
 use bridge::store::{End, Record, Store};
 use model::flash::ModelFlash;
@@ -49,7 +50,10 @@ fn a_cut_at_any_write_leaves_the_record_before_or_this_one_or_says_that_nobody_k
         let found = noted(&flash);
         unknown += u32::from(found.is_none());
         let at_rest = if before > 0 { record(before, Some(End::Legal)) } else { None };
-        assert!(found.is_none() || found == record(job, None) || is_cut && found == at_rest, "{round}: {found:?}");
+        assert!(
+            found.is_none() || found == record(job, None) || is_cut && found == at_rest,
+            "{round}: {found:?}"
+        );
         // And at its end.
         let mut store = Store::open(flash.clone());
         store.note_begin(job, 0);

@@ -97,7 +97,10 @@ fn a_turn_of_work_ends_with_its_time_or_with_the_work() {
     let streams = planes.streams();
     let mut engine = engine();
     let (mut reader, now, slices) = (protocol::link::frame::Reader::new(), Cell::new(0u64), Cell::new(0));
-    assert_eq!(turn::work(&mut engine, || now.get()), Turn { more: false, wake_port: false, wake_store: false });
+    assert_eq!(
+        turn::work(&mut engine, || now.get()),
+        Turn { more: false, wake_port: false, wake_store: false }
+    );
     let length = streams.len() as u32;
     engine.receive(&mut reader, &framed(&ToBridge::Begin { job: 3, kind: JobKind::Streams, length }));
     let bytes = &streams[..streams.len().min(900)];

@@ -91,7 +91,10 @@ impl Printers {
         if let Some(shared) = &shared
             && tempfile::Builder::new().prefix(".try.").tempfile_in(shared).is_ok()
         {
-            return Ok(Printers { folders: [shared.clone()].into_iter().chain(own.ok()).collect(), written: 0 });
+            return Ok(Printers {
+                folders: [shared.clone()].into_iter().chain(own.ok()).collect(),
+                written: 0,
+            });
         }
         let own = own?;
         durable::make_folder(&own, Access::Everyone).map_err(io_error("make", &own))?;
@@ -156,9 +159,15 @@ impl Printers {
             }
         }
         let counts = |name: &str, own: u32| {
-            closed.get(name).is_some_and(|owners| owners.iter().any(|&owner| [own, 0, user()].contains(&owner)))
+            closed
+                .get(name)
+                .is_some_and(|owners| owners.iter().any(|&owner| [own, 0, user()].contains(&owner)))
         };
-        Ok(open.into_iter().filter(|(_, name, own)| !counts(name, *own)).map(|(path, ..)| Note(path)).collect())
+        Ok(open
+            .into_iter()
+            .filter(|(_, name, own)| !counts(name, *own))
+            .map(|(path, ..)| Note(path))
+            .collect())
     }
 
     /// Notes that the device holds nothing any more of what was noted.
@@ -193,7 +202,9 @@ impl Printers {
         for path in names.filter_map(|item| Some(item.ok()?.path())) {
             let is_list = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(CLOSED));
             let Some(found) = path.symlink_metadata().ok().filter(|_| is_list) else { continue };
-            let there = |name: &String| self.folders.iter().any(|folder| folder.join(name).symlink_metadata().is_ok());
+            let there = |name: &String| {
+                self.folders.iter().any(|folder| folder.join(name).symlink_metadata().is_ok())
+            };
             if owner(&found) == user() && !list(&path, &found).iter().any(there) {
                 let _ = fs::remove_file(path);
             }
@@ -348,6 +359,9 @@ mod tests {
         for name in ["closed.3", "open.device.x"] {
             std::os::unix::fs::symlink("/dev/zero", folder.path().join(name)).unwrap();
         }
-        assert!(count(&printers, None) > 0, "a link is a note of which nothing is known, and is not followed");
+        assert!(
+            count(&printers, None) > 0,
+            "a link is a note of which nothing is known, and is not followed"
+        );
     }
 }

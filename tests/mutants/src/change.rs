@@ -1,8 +1,9 @@
 //! What is changed in a source: each decision by a switch with a number.
 //!
-//! A comparison becomes its neighbour (`==` `!=`, `<` `<=`, `>` `>=`), `&&` and `||` become each other, a store to a field does not
-//! happen, an early return does not return. All of them are in one build: `mutant(7)` says whether the seventh is the one that is
-//! tried. What a macro is given, constants and tests stay as they are.
+//! A comparison becomes its neighbour (`==` `!=`, `<` `<=`, `>` `>=`), `&&` and `||` become each other, a
+//! store to a field does not happen, an early return does not return. All of them are in one build:
+//! `mutant(7)` says whether the seventh is the one that is tried. What a macro is given, constants and tests
+//! stay as they are.
 
 use syn::spanned::Spanned as _;
 use syn::visit_mut::{self, VisitMut};
@@ -52,7 +53,9 @@ fn short(tokens: &impl quote::ToTokens) -> String {
 }
 
 fn is_test(attributes: &[syn::Attribute]) -> bool {
-    attributes.iter().any(|attribute| attribute.path().is_ident("cfg") && short(&attribute.meta).contains("test"))
+    attributes
+        .iter()
+        .any(|attribute| attribute.path().is_ident("cfg") && short(&attribute.meta).contains("test"))
 }
 
 /// Whether this is a switch that was put in by hand.
@@ -120,7 +123,8 @@ impl VisitMut for Changer<'_> {
         let (left, op, right) = (&binary.left, &binary.op, &binary.right);
         let what = format!("{} for {} behind `{}`", short(&other), short(op), short(left));
         let number = self.number(op.span().start().line, what);
-        *expression = parse_quote! { (if crate::mutant(#number) { #left #other #right } else { #left #op #right }) };
+        *expression =
+            parse_quote! { (if crate::mutant(#number) { #left #other #right } else { #left #op #right }) };
     }
 
     fn visit_block_mut(&mut self, block: &mut Block) {

@@ -1,11 +1,13 @@
 //! Whether a test notices when a decision of the bridge is another one: `cargo xtask mutants`.
 //!
-//! Problem: a test that passes proves nothing unless one would fail where the code is wrong. Method: a copy of the sources, in which
-//! each decision of the files that decide ([`DECIDE`]) is [changed](change) by a switch, all of them in one build; then the bridge's tests
-//! and some seconds of the simulation of the whole system run once for each number, until one fails. Faults that were once found or planted by
-//! hand (`planted.toml`) are tried, too.
+//! Problem: a test that passes proves nothing unless one would fail where the code is wrong. Method: a copy
+//! of the sources, in which each decision of the files that decide ([`DECIDE`]) is [changed](change) by a
+//! switch, all of them in one build; then the bridge's tests and some seconds of the simulation of the whole
+//! system run once for each number, until one fails. Faults that were once found or planted by hand
+//! (`planted.toml`) are tried, too.
 //! Cost: a build, and half a minute for each mutant that lives. Limits: what hangs counts as noticed.
-//! Source: mutation testing (DeMillo, Lipton, Sayward, 1978); one build for all by switches ("mutant schemata", Untch and others, 1993).
+//! Source: mutation testing (DeMillo, Lipton, Sayward, 1978); one build for all by switches ("mutant
+//! schemata", Untch and others, 1993).
 
 mod change;
 
@@ -99,10 +101,15 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// Copies the sources that git knows, with a switch for each decision; says which there are. Those that are planted have line 0.
+/// Copies the sources that git knows, with a switch for each decision; says which there are. Those that are
+/// planted have line 0.
 fn prepare(root: &Path, tree: &Path) -> Result<Vec<Mutant>> {
-    let listed = Command::new("git").args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"]).current_dir(root).output()?;
-    let Planted { fault: planted } = toml::from_str(&fs::read_to_string(root.join("tests/mutants/planted.toml"))?)?;
+    let listed = Command::new("git")
+        .args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"])
+        .current_dir(root)
+        .output()?;
+    let Planted { fault: planted } =
+        toml::from_str(&fs::read_to_string(root.join("tests/mutants/planted.toml"))?)?;
     let of = |Fault { file, what, .. }: &Fault| Mutant { file: file.clone(), line: 0, what: what.clone() };
     let mut mutants: Vec<Mutant> = planted.iter().map(of).collect();
     let files = String::from_utf8(listed.stdout)?;
@@ -143,7 +150,15 @@ impl Fault {
 fn build(place: &Path) -> Result<Vec<(PathBuf, PathBuf)>> {
     let tree = place.join("tree");
     let output = Command::new(env::var("CARGO").unwrap_or_else(|_| "cargo".into()))
-        .args(["test", "--no-run", "--message-format=json", "-p", "foilpress-bridge", "-p", "foilpress-system"])
+        .args([
+            "test",
+            "--no-run",
+            "--message-format=json",
+            "-p",
+            "foilpress-bridge",
+            "-p",
+            "foilpress-system",
+        ])
         .current_dir(&tree)
         .env("CARGO_TARGET_DIR", place.join("build"))
         .env("CARGO_INCREMENTAL", "0")
@@ -153,7 +168,8 @@ fn build(place: &Path) -> Result<Vec<(PathBuf, PathBuf)>> {
     let mut tests = Vec::new();
     for line in String::from_utf8(output.stdout)?.lines() {
         let Ok(message) = serde_json::from_str::<serde_json::Value>(line) else { continue };
-        if let (Some(program), Some(manifest)) = (message["executable"].as_str(), message["manifest_path"].as_str())
+        if let (Some(program), Some(manifest)) =
+            (message["executable"].as_str(), message["manifest_path"].as_str())
             && let Some(folder) = Path::new(manifest).parent()
         {
             tests.push((program.into(), folder.into()));
@@ -165,7 +181,12 @@ fn build(place: &Path) -> Result<Vec<(PathBuf, PathBuf)>> {
 }
 
 /// Tries the chosen ones, two at a time; gives those that lived.
-fn try_all(tests: &[(PathBuf, PathBuf)], chosen: &[usize], mutants: &[Mutant], limit: Duration) -> Result<Vec<usize>> {
+fn try_all(
+    tests: &[(PathBuf, PathBuf)],
+    chosen: &[usize],
+    mutants: &[Mutant],
+    limit: Duration,
+) -> Result<Vec<usize>> {
     let (next, lived) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let work = || -> Result<()> {
         while let Some(&number) = chosen.get(next.fetch_add(1, Ordering::Relaxed)) {
@@ -182,7 +203,9 @@ fn try_all(tests: &[(PathBuf, PathBuf)], chosen: &[usize], mutants: &[Mutant], l
     };
     thread::scope(|scope| {
         let threads: Vec<_> = (0..2).map(|_| scope.spawn(work)).collect();
-        threads.into_iter().try_for_each(|thread| thread.join().unwrap_or_else(|_| anyhow::bail!("a thread failed")))
+        threads
+            .into_iter()
+            .try_for_each(|thread| thread.join().unwrap_or_else(|_| anyhow::bail!("a thread failed")))
     })?;
     let mut lived = lived.into_inner().unwrap_or_default();
     lived.sort_unstable();

@@ -1,4 +1,5 @@
-//! The board: engine, store, ways to the host, and the driver at the simulated cable, with memory that outlives a reset.
+//! The board: engine, store, ways to the host, and the driver at the simulated cable, with memory that
+//! outlives a reset.
 
 use bridge::alone::Alone;
 use bridge::checkpoint::{CheckpointStore, MARKS, Memory as Slots, PAST_SLOT, SLOT};
@@ -7,9 +8,7 @@ use bridge::engine::{Checkpoint, Engine, Identity, Memory};
 use bridge::links::Links;
 use bridge::port::{Port, Timing};
 use bridge::printer_class::{DeviceId, Intake};
-use bridge::simulation::{
-    AckLine, DataLines, DelayLine, InLine, OutLine, SimulatedBoard, SimulatedPort,
-};
+use bridge::simulation::{AckLine, DataLines, DelayLine, InLine, OutLine, SimulatedBoard, SimulatedPort};
 use model::flash::ModelFlash;
 use protocol::link::message::Lines;
 use std::ops::Range;
@@ -74,7 +73,8 @@ impl Slots for Retained {
     }
 }
 
-/// The board at the cable: the sender's bytes leave their marks in the memory that outlives a reset. Clones are the same.
+/// The board at the cable: the sender's bytes leave their marks in the memory that outlives a reset. Clones
+/// are the same.
 #[derive(Clone)]
 struct AtCable {
     board: SimulatedBoard,
@@ -191,8 +191,8 @@ pub fn memory(data: usize, output: usize) -> Memory<'static> {
 }
 
 impl Board {
-    /// The board starts at this cable; `known` says that its memory is what an earlier start has left there, `from_outside` that it was
-    /// not reset by its own watchdog.
+    /// The board starts at this cable; `known` says that its memory is what an earlier start has left there,
+    /// `from_outside` that it was not reset by its own watchdog.
     pub fn start(
         memory: Memory<'static>,
         cable: &SimulatedPort,
@@ -224,7 +224,8 @@ impl Board {
         self.driver.poll(&mut self.engine, &mut self.id)
     }
 
-    /// The board stops: its memory. A byte whose strobe is under way comes to its end; all are marked but the last `unmarked`.
+    /// The board stops: its memory. A byte whose strobe is under way comes to its end; all are marked but the
+    /// last `unmarked`.
     pub fn stop(self, unmarked: u32) -> Memory<'static> {
         self.at_cable.board.halt();
         self.at_cable.mark_crossed(unmarked);

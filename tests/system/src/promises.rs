@@ -1,8 +1,8 @@
 //! What is promised to users, each sentence with a name, and how often each was put to the test.
 //!
-//! A promise that nothing endangers is kept by anything. So whoever lives in the world notes each moment in which a promise could
-//! have broken: which, by which door bytes were asked for, and where the board took the printer to stand. A run prints that table. A
-//! cell that cannot be reached has a reason ([`cannot`]).
+//! A promise that nothing endangers is kept by anything. So whoever lives in the world notes each moment in
+//! which a promise could have broken: which, by which door bytes were asked for, and where the board took the
+//! printer to stand. A run prints that table. A cell that cannot be reached has a reason ([`cannot`]).
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -10,15 +10,18 @@ use std::fmt::Write as _;
 /// A promise, and where it is given.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Promise {
-    /// Guide, 6: "The program sends only one whole legal job." What reaches the printer behind a part of a sheet is a reset.
+    /// Guide, 6: "The program sends only one whole legal job." What reaches the printer behind a part of a
+    /// sheet is a reset.
     NothingIntoAnotherSheet,
     /// Guide, 6: "It never sends a job a second time by itself."
     NothingTwice,
     /// Guide, 6: "What it calls *printed* has crossed the printer's own port", and all of it, byte for byte.
     PrintedIsAtThePrinter,
-    /// Guide, 6: "If the printer or the bridge loses power in the middle, the sheet is lost, and the program says so."
+    /// Guide, 6: "If the printer or the bridge loses power in the middle, the sheet is lost, and the program
+    /// says so."
     LossIsTold,
-    /// Guide, 6, and wiring: a pulled data cable, a crash or a restart of the board by its watchdog costs nothing.
+    /// Guide, 6, and wiring: a pulled data cable, a crash or a restart of the board by its watchdog costs
+    /// nothing.
     HarmlessCostsNothing,
     /// Guide, 6: "or end the sheet; the printer is ready for the next job".
     EndedSheetIsLegal,
@@ -132,9 +135,13 @@ impl Table {
                 for state in State::ALL {
                     let count = self.count(promise, door, state);
                     match cannot(promise, door, state) {
-                        None if count == 0 => gaps.push(format!("{promise:?} by {door:?} in {state:?}: never")),
+                        None if count == 0 => {
+                            gaps.push(format!("{promise:?} by {door:?} in {state:?}: never"))
+                        }
                         Some(why) if count > 0 => {
-                            gaps.push(format!("{promise:?} by {door:?} in {state:?}: {count} times, though {why}"));
+                            gaps.push(format!(
+                                "{promise:?} by {door:?} in {state:?}: {count} times, though {why}"
+                            ));
                         }
                         _ => {}
                     }
@@ -144,7 +151,8 @@ impl Table {
         gaps
     }
 
-    /// The table as text: a row for each promise and door, a column for each state; `-` where there can be nothing.
+    /// The table as text: a row for each promise and door, a column for each state; `-` where there can be
+    /// nothing.
     pub fn text(&self) -> String {
         let mut text = format!("{:<24} {:<9}", "endangered", "by");
         for state in State::ALL {
@@ -177,13 +185,17 @@ pub fn cannot(promise: Promise, door: Door, state: State) -> Option<&'static str
             Some("the board would take a printer with a part of a sheet to have none, or its own")
         }
         (NothingIntoAnotherSheet, _, State::Down) => Some("nobody asks a board that is down"),
-        (NothingTwice, Door::Plain | Door::Button | Door::Question, _) => Some("such a job has no number of its own"),
+        (NothingTwice, Door::Plain | Door::Button | Door::Question, _) => {
+            Some("such a job has no number of its own")
+        }
         (NothingTwice, _, State::Down) => Some("nobody asks a board that is down"),
         (PrintedIsAtThePrinter, Door::Plain | Door::Button | Door::Question, _) => {
             Some("nobody is told how such a job has ended")
         }
         (PrintedIsAtThePrinter, _, State::Down) => Some("a board that is down tells nothing"),
-        (LossIsTold, Door::Plain | Door::Button | Door::Question, _) => Some("nobody is told how such a job has ended"),
+        (LossIsTold, Door::Plain | Door::Button | Door::Question, _) => {
+            Some("nobody is told how such a job has ended")
+        }
         (LossIsTold, _, State::Down) => Some("a board that is down tells nothing"),
         (HarmlessCostsNothing, Door::Plain | Door::Button | Door::Question, _) => {
             Some("nobody is told how such a job has ended")
@@ -193,8 +205,12 @@ pub fn cannot(promise: Promise, door: Door, state: State) -> Option<&'static str
         (EndedSheetIsLegal, _, State::Unknown | State::AtRest | State::Down) => {
             Some("of a sheet that is ended a part has crossed")
         }
-        (NoQuestionInASheet, Door::Link | Door::Plain | Door::Stored | Door::Button, _) => Some("it is about questions"),
-        (NoQuestionInASheet, _, State::AtRest) => Some("the board would take a printer with a part of a sheet to have none"),
+        (NoQuestionInASheet, Door::Link | Door::Plain | Door::Stored | Door::Button, _) => {
+            Some("it is about questions")
+        }
+        (NoQuestionInASheet, _, State::AtRest) => {
+            Some("the board would take a printer with a part of a sheet to have none")
+        }
         (NoQuestionInASheet, _, State::Down) => Some("nobody asks a board that is down"),
         (OutIsOut, Door::Plain | Door::Stored | Door::Button | Door::Question, _) => {
             Some("the program waits for sheets of its own jobs only")
@@ -202,8 +218,12 @@ pub fn cannot(promise: Promise, door: Door, state: State) -> Option<&'static str
         (OutIsOut, _, State::Down) => Some("nobody asks a board that is down"),
         (EveryJobEnds, Door::Question, _) => Some("it is about jobs"),
         (EveryJobEnds, Door::Plain | Door::Button, _) => Some("such a job is known to the board alone"),
-        (StoredIsWholeOrBroken, Door::Link | Door::Plain | Door::Question, _) => Some("it is about stored jobs"),
-        (StoredIsWholeOrBroken, _, State::Unknown | State::AtRest | State::Down) => Some("it is judged in its sheet"),
+        (StoredIsWholeOrBroken, Door::Link | Door::Plain | Door::Question, _) => {
+            Some("it is about stored jobs")
+        }
+        (StoredIsWholeOrBroken, _, State::Unknown | State::AtRest | State::Down) => {
+            Some("it is judged in its sheet")
+        }
         _ => None,
     }
 }

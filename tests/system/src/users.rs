@@ -1,8 +1,8 @@
 //! Users and their processes: the program's own delivery and journal, on a folder of this computer.
 //!
-//! A process runs until it ends, is killed, or its user leaves, and the other user's beside it. A process that is killed unwinds without
-//! a word; what it has on disk stays as it is. Whether a caller agrees to a question and how long it waits is drawn: a terminal, a
-//! script and a queue differ in nothing else.
+//! A process runs until it ends, is killed, or its user leaves, and the other user's beside it. A process
+//! that is killed unwinds without a word; what it has on disk stays as it is. Whether a caller agrees to a
+//! question and how long it waits is drawn: a terminal, a script and a queue differ in nothing else.
 
 use crate::chance::{Draw, Kind};
 use crate::pool;
@@ -110,7 +110,8 @@ impl Caller for Person<'_> {
     }
 }
 
-/// A process of a user from its beginning to its end: it does something, whatever the numbers say, or what is open comes to its end.
+/// A process of a user from its beginning to its end: it does something, whatever the numbers say, or what is
+/// open comes to its end.
 pub fn run(world: &Shared, user: usize, mut draw: Draw, calm: bool) {
     let what = if calm { None } else { Some(draw.below(15)) };
     let shared = world.look().shared.clone();
@@ -151,7 +152,8 @@ pub fn run(world: &Shared, user: usize, mut draw: Draw, calm: bool) {
     }
 }
 
-/// When all is well again, the users go on by turns until none of their jobs is open: one may wait for another's.
+/// When all is well again, the users go on by turns until none of their jobs is open: one may wait for
+/// another's.
 pub fn finish(world: &Shared) {
     for user in 0..USERS {
         await_end(world, user);
@@ -330,7 +332,8 @@ fn told(world: &Shared, number: u32, outcome: Outcome) {
         world.endanger(Promise::PrintedIsAtThePrinter, number);
     }
     let found = format!("job {number:08x} is told as {outcome:?}; {known:?}");
-    // A bridge remembers so many jobs, and whoever asks only behind them cannot be told; nor can one behind a cut and another sheet.
+    // A bridge remembers so many jobs, and whoever asks only behind them cannot be told; nor can one behind a
+    // cut and another sheet.
     let is_long_ago = world.known.values().filter(|other| other.order > known.order).count() >= PAST;
     let is_last = world.last_begun == number;
     let harmed = known.harmed || known.stored && world.has_aged();

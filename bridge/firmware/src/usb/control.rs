@@ -18,8 +18,8 @@ use embassy_futures::select::{Either, select};
 use embassy_rp::pac;
 use embassy_time::Timer;
 use embassy_usb::driver::{
-    Bus, ControlPipe, Direction, Driver, EndpointAddress, EndpointAllocError, EndpointError, EndpointType, Event,
-    Unsupported,
+    Bus, ControlPipe, Direction, Driver, EndpointAddress, EndpointAllocError, EndpointError, EndpointType,
+    Event, Unsupported,
 };
 
 /// Longer than the longest packet takes on the bus.

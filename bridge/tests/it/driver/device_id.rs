@@ -1,4 +1,5 @@
-//! The printer's device ID: asked for by a host, or by the bridge itself when the printer has been switched on.
+//! The printer's device ID: asked for by a host, or by the bridge itself when the printer has been switched
+//! on.
 
 use super::{ID, events, foreign, introducing, negotiations, send, text};
 use bridge::driver::Event;
@@ -39,7 +40,8 @@ fn a_printer_that_has_shown_that_it_does_not_negotiate_is_left_alone_until_it_is
     bench.pass(600 * MS);
     assert_eq!(bench.ask(1, Ask::DeviceId), text(Answer::OneWay));
     assert_eq!(negotiations(&bench), 1);
-    // Another printer may be there when it is on again, or the same in the middle of a sheet: behind a reset it is asked.
+    // Another printer may be there when it is on again, or the same in the middle of a sheet: behind a reset
+    // it is asked.
     bench.cable.switch(false);
     bench.pass(30 * MS);
     bench.cable.switch(true);
@@ -109,7 +111,11 @@ fn a_printer_introduces_itself_once_each_time_it_is_switched_on() {
     assert_eq!(bench.id.bytes(), unheard);
     bench.cable.switch(true);
     bench.pass(600 * MS);
-    assert_eq!((bench.id.bytes(), events(&bench).len()), (&unheard[..], 1), "it may be in the middle of a sheet");
+    assert_eq!(
+        (bench.id.bytes(), events(&bench).len()),
+        (&unheard[..], 1),
+        "it may be in the middle of a sheet"
+    );
     bench.tell(&ToBridge::Initialise { request: 7 });
     bench.pass(600 * MS);
     assert_eq!((bench.id.bytes(), events(&bench).len()), (&heard[..], 2));

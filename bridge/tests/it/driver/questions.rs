@@ -19,11 +19,7 @@ fn the_status_comes_back_whole_wherever_the_answer_breaks_and_however_late_it_is
         ];
         let mut board = Board::new(2048, 2048);
         let mut bench = Bench::new(&mut board, answering(pieces));
-        assert_eq!(
-            bench.ask(1, Ask::Printer),
-            text(Answer::Bytes(&whole)),
-            "{first} bytes, {after_ms} ms"
-        );
+        assert_eq!(bench.ask(1, Ask::Printer), text(Answer::Bytes(&whole)), "{first} bytes, {after_ms} ms");
         assert_eq!(bench.cable.taken(), [0x05, 0x01]);
         assert_eq!(check(&bench.cable.edges(), &Timing::DEFAULT), []);
     }
@@ -32,7 +28,8 @@ fn the_status_comes_back_whole_wherever_the_answer_breaks_and_however_late_it_is
 proptest! {
     #![proptest_config(testing::cases(24))]
 
-    /// Whatever the printer's times are, it gets the question once, and its answer arrives if it comes in time.
+    /// Whatever the printer's times are, it gets the question once, and its answer arrives if it comes in
+    /// time.
     #[test]
     fn a_printer_is_asked_once_and_its_answer_arrives_if_it_comes_within_two_seconds(
         busy_before_ms in 0u64..1_800,
@@ -161,7 +158,8 @@ fn the_printer_is_asked_only_when_it_is_known_to_stand_between_two_jobs() {
     let peripheral = || answering(vec![Response { after: 0, bytes: status() }]);
     let unsure = text(Answer::Unsure);
     let whole = text(Answer::Bytes(&status()));
-    // A bridge that has just got its supply, and whose diary says nothing, does not know what the printer stands in.
+    // A bridge that has just got its supply, and whose diary says nothing, does not know what the printer
+    // stands in.
     let mut board = Board::new(4096, 4096);
     let mut bench = Bench::unaware(&mut board, peripheral());
     assert_eq!((bench.ask(1, Ask::Printer), bench.cable.taken().len()), (unsure.clone(), 0));

@@ -26,7 +26,11 @@ fn a_printer_without_its_supply_gets_nothing_and_then_a_reset_before_the_first_b
     assert!(!rig.engine.output().is_empty());
     let off = Lines(Lines::IDLE.0 & !Lines::POWER);
     rig.engine.port(off, Some(Fault::PowerOff));
-    assert!(rig.engine.output().is_empty() && rig.engine.output_behind(3).is_empty() && rig.engine.task().is_none());
+    assert!(
+        rig.engine.output().is_empty()
+            && rig.engine.output_behind(3).is_empty()
+            && rig.engine.task().is_none()
+    );
     rig.engine.port(Lines::IDLE, None);
     assert!(rig.engine.output().is_empty());
     assert_eq!(rig.engine.task(), Some(Task::Initialise));

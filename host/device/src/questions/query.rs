@@ -156,7 +156,11 @@ impl<'t> Query<'t> {
     /// Greets the bridge, which has to speak this program's messages. Changes nothing: a job under way goes on.
     pub fn new(link: &'t mut dyn Transport, patience: Duration) -> Result<Query<'t>, QueryError> {
         let query = Query::with_any(link, patience)?;
-        if query.said.bridge.version == VERSION { Ok(query) } else { Err(QueryError::Version(query.said.bridge)) }
+        if query.said.bridge.version == VERSION {
+            Ok(query)
+        } else {
+            Err(QueryError::Version(query.said.bridge))
+        }
     }
 
     /// The same whatever messages it speaks: to put other firmware on it.

@@ -1,11 +1,13 @@
 //! From the last byte to the sheet: what the printer itself says while it prints from its own memory.
 //!
-//! Problem: a job is done when the sheet is out, but what the bridge knows is that the last byte has crossed the port;
-//! the printer holds some of it and prints for a while. Method: ask for its status every few seconds, as the vendor's
-//! own monitor does. Its answer lags: an MD-5000 says idle right behind the last byte and then prints for half a minute. So
-//! the sheet is out when the printer was seen at work and has ended, or has been idle for 20 s. Another job that comes meanwhile
-//! makes the answer that one's, and then nothing is known.
-//! Limits: a port that does not talk back tells nothing, and that is what is reported; the sheet itself nobody but the user can see.
+//! Problem: a job is done when the sheet is out, but what the bridge knows is that the last byte has crossed
+//! the port; the printer holds some of it and prints for a while. Method: ask for its status every few
+//! seconds, as the vendor's own monitor does. Its answer lags: an MD-5000 says idle right behind the last
+//! byte and then prints for half a minute. So the sheet is out when the printer was seen at work and has
+//! ended, or has been idle for 20 s. Another job that comes meanwhile makes the answer that one's, and then
+//! nothing is known.
+//! Limits: a port that does not talk back tells nothing, and that is what is reported; the sheet itself
+//! nobody but the user can see.
 //! A printer that is switched off and on between two questions has lost the sheet and says that it is idle.
 
 use std::time::Duration;
@@ -54,8 +56,9 @@ fn unknown(why: &str) -> Sheet {
     Sheet::Unknown(why.into())
 }
 
-/// Waits, without limit, until the printer says that it is done with this job, asking every few seconds. `watch` is told what is the
-/// matter with the printer, once for each change; nothing when all is well again. `pause` says whether to go on.
+/// Waits, without limit, until the printer says that it is done with this job, asking every few seconds.
+/// `watch` is told what is the matter with the printer, once for each change; nothing when all is well again.
+/// `pause` says whether to go on.
 pub(crate) fn await_sheet(
     job: u32,
     open: &mut dyn FnMut() -> Result<Box<dyn Transport>, OpenError>,

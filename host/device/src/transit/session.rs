@@ -1,14 +1,14 @@
 //! A job's conversation with the bridge: bytes in, bytes out, no clock and no input or output of its own.
 //!
-//! Problem: the link may lose, repeat, reorder and damage frames and may vanish at any byte; this process may be
-//! killed between any two instructions; the bridge may restart. The bytes at the printer must be those of an
-//! undisturbed run, once, or the user must be told that the sheet is lost: never printed twice.
-//! Method: positions. Every piece of data carries its offset, the bridge says what comes next, and repeating is
-//! harmless. What must be known after a crash is in the [`Record`], which is made durable *before* the step it
-//! speaks of: [`Session::speak`] saves the record before the first Begin and before the first Data leave. So a job
-//! in [`Phase::Queued`] or [`Phase::Begun`] has certainly not reached the printer and may be begun (again), and one in
-//! [`Phase::Sending`] goes on only if the bridge itself still shows it; if it does not, it is never begun anew. How it has ended
-//! since, the bridge remembers, also behind other jobs.
+//! Problem: the link may lose, repeat, reorder and damage frames and may vanish at any byte; this process may
+//! be killed between any two instructions; the bridge may restart. The bytes at the printer must be those of
+//! an undisturbed run, once, or the user must be told that the sheet is lost: never printed twice.
+//! Method: positions. Every piece of data carries its offset, the bridge says what comes next, and repeating
+//! is harmless. What must be known after a crash is in the [`Record`], which is made durable *before* the
+//! step it speaks of: [`Session::speak`] saves the record before the first Begin and before the first Data
+//! leave. So a job in [`Phase::Queued`] or [`Phase::Begun`] has certainly not reached the printer and may be
+//! begun (again), and one in [`Phase::Sending`] goes on only if the bridge itself still shows it; if it does
+//! not, it is never begun anew. How it has ended since, the bridge remembers, also behind other jobs.
 //! Cost: one pass over the data for framing; nothing is copied but into the outgoing buffer.
 //! Limits: one job at a time. The credit the bridge gives is never exceeded, so the bridge always reads.
 //! Source: `docs/wire-format.md`, section 3.
@@ -31,8 +31,8 @@ const REPEAT: Duration = Duration::from_millis(300);
 const QUIET: Duration = Duration::from_secs(1);
 /// A link on which nothing comes for this long, though it was asked, is dead.
 const DEAD: Duration = Duration::from_secs(5);
-/// Statements that contradict what is known are believed when they have been made this often, a question apart: a
-/// single one may be a late repetition.
+/// Statements that contradict what is known are believed when they have been made this often, a question
+/// apart: a single one may be a late repetition.
 const CONVINCED: u8 = 3;
 /// Bytes to give out at once; what comes back is looked at in between.
 const BURST: usize = 8 * MAX;
@@ -145,7 +145,8 @@ impl<'d> Session<'d> {
         session
     }
 
-    /// A conversation about a new job that is to be stored under this name, of at most [`NAME_MAX`] bytes, and not printed.
+    /// A conversation about a new job that is to be stored under this name, of at most [`NAME_MAX`] bytes,
+    /// and not printed.
     pub fn storing(record: Record, data: &'d [u8], name: &'d str) -> Session<'d> {
         Session { store: Some(name), ..Session::new(record, data) }
     }
@@ -217,8 +218,8 @@ impl<'d> Session<'d> {
             && self.progress.is_some_and(|progress| self.gives(&progress))
     }
 
-    /// Whether there are data to give. A cancelled job of which nothing has left goes no further: whether the printer is ready for it
-    /// was never asked.
+    /// Whether there are data to give. A cancelled job of which nothing has left goes no further: whether the
+    /// printer is ready for it was never asked.
     fn gives(&self, progress: &Progress) -> bool {
         self.next < progress.limit && !(self.record.cancel && self.record.phase == Phase::Begun)
     }
@@ -418,8 +419,8 @@ impl<'d> Session<'d> {
         self.contradictions >= CONVINCED
     }
 
-    /// Appends what is to be said now to `out`: some kilobytes at most. Calls `save` before anything leaves that the
-    /// record has to know of; if that fails nothing leaves.
+    /// Appends what is to be said now to `out`: some kilobytes at most. Calls `save` before anything leaves
+    /// that the record has to know of; if that fails nothing leaves.
     pub fn speak<E>(
         &mut self,
         now: Duration,

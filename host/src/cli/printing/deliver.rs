@@ -287,7 +287,9 @@ fn not_sent(failure: Failure, to: Option<&Address>) -> anyhow::Error {
 /// A failure with what can be done about it on the command line.
 fn advised(failure: Failure, to: Option<&Address>) -> anyhow::Error {
     let advice = match (&failure, to) {
-        (Failure::ResetOwed(_), Some(to)) => format!("then `foilpress bridge reset --to {to}`, and send the job again"),
+        (Failure::ResetOwed(_), Some(to)) => {
+            format!("then `foilpress bridge reset --to {to}`, and send the job again")
+        }
         (Failure::ResetOwed(_), None) => {
             "switch it off and on, then confirm that with `foilpress bridge reset --by-hand`".into()
         }

@@ -62,10 +62,11 @@ impl World {
             let (line, ms) = ([Line::Busy, Line::PaperOut][draw.below(2)], 1 + draw.below(4_000) as u64);
             self.cable.pause(Pause { after: 1, line, ns: ms * 1_000_000 });
         }
-        // A printer that is switched off only while the board restarts is one that nobody has seen off; and until the board has
-        // seen it off, it does not restart.
+        // A printer that is switched off only while the board restarts is one that nobody has seen off; and
+        // until the board has seen it off, it does not restart.
         let unseen = self.printer.off_until > self.now && !self.has_seen_it_off();
-        for (kind, how) in [(Kind::Watchdog, Down::Watchdog), (Kind::Run, Down::Run), (Kind::Cut, Down::Cut)] {
+        for (kind, how) in [(Kind::Watchdog, Down::Watchdog), (Kind::Run, Down::Run), (Kind::Cut, Down::Cut)]
+        {
             if !unseen
                 && self.board.is_some()
                 && let Some(draw) = self.chance.happens(kind)

@@ -1,7 +1,8 @@
-//! The world for those who live in it: each process is a thread, and of all of them and the world one acts at a time.
+//! The world for those who live in it: each process is a thread, and of all of them and the world one acts at
+//! a time.
 //!
-//! A process acts until it waits for something; then the world goes on by a step, and each process that waits looks again. So a
-//! step of one may fall anywhere in another, and the same seed does the same again.
+//! A process acts until it waits for something; then the world goes on by a step, and each process that waits
+//! looks again. So a step of one may fall anywhere in another, and the same seed does the same again.
 
 use super::{Burst, Todo, USERS, WAYS, World};
 use crate::chance::Draw;
@@ -100,7 +101,12 @@ impl Shared {
         }
         self.pass(Some(user));
         let acts = locked(&self.0.acts);
-        drop(self.0.passed.wait_while(acts, |acts| *acts == Some(user)).unwrap_or_else(PoisonError::into_inner));
+        drop(
+            self.0
+                .passed
+                .wait_while(acts, |acts| *acts == Some(user))
+                .unwrap_or_else(PoisonError::into_inner),
+        );
         if !self.look().runs[user]
             && let Some(thread) = locked(&self.0.threads)[user].take()
         {
@@ -122,7 +128,12 @@ impl Shared {
 
     fn await_turn(&self, user: usize) {
         let acts = locked(&self.0.acts);
-        drop(self.0.passed.wait_while(acts, |acts| *acts != Some(user)).unwrap_or_else(PoisonError::into_inner));
+        drop(
+            self.0
+                .passed
+                .wait_while(acts, |acts| *acts != Some(user))
+                .unwrap_or_else(PoisonError::into_inner),
+        );
     }
 
     /// In a user's process: lets a step of at most this long pass.

@@ -15,7 +15,8 @@ impl World {
         if self.board.is_none() {
             return self.to_board.clear();
         }
-        let (due, left) = std::mem::take(&mut self.to_board).into_iter().partition(|burst| burst.due <= self.now);
+        let (due, left) =
+            std::mem::take(&mut self.to_board).into_iter().partition(|burst| burst.due <= self.now);
         self.to_board = left;
         let due: Vec<super::Burst> = due;
         for burst in due {
@@ -101,7 +102,8 @@ impl World {
             return self.stop(Down::Cut, 0, draw);
         }
         // One that goes down does so anywhere in its turn.
-        let end_ns = if down.is_some() { end_ns - draw.below(time_us as usize * 1000) as u64 } else { end_ns };
+        let end_ns =
+            if down.is_some() { end_ns - draw.below(time_us as usize * 1000) as u64 } else { end_ns };
         while self.cable.now() < end_ns {
             self.poll();
             let left_ns = end_ns.saturating_sub(self.cable.now());
@@ -112,7 +114,8 @@ impl World {
         }
         if let Some(down) = down {
             self.ended();
-            // RUN is pressed while bytes flow: the strobe of the last one is over, and its mark is not made yet.
+            // RUN is pressed while bytes flow: the strobe of the last one is over, and its mark is not made
+            // yet.
             let unmarked = u32::from(down == Down::Run && draw.one_in_1000(800));
             return self.stop(down, unmarked, draw);
         }

@@ -7,13 +7,15 @@ use system::{report, run};
 /// For how long it is tried on an ordinary day; the gate says for how long then.
 const EVERYDAY_SECONDS: u64 = 10;
 
-/// In a minute each promise is endangered so often that it would break; all that can happen has happened in half an hour.
+/// In a minute each promise is endangered so often that it would break; all that can happen has happened in
+/// half an hour.
 const MINUTE: u64 = 60;
 const OFTEN: u64 = 100;
 const ALL_SECONDS: u64 = 1_800;
 
-/// `FOILPRESS_SEED` and `FOILPRESS_SECONDS` choose what is tried, and for how long. Without the first the seed is that of the
-/// property tests, which the gate draws from the commit; without either it is drawn from the clock.
+/// `FOILPRESS_SEED` and `FOILPRESS_SECONDS` choose what is tried, and for how long. Without the first the
+/// seed is that of the property tests, which the gate draws from the commit; without either it is drawn from
+/// the clock.
 fn number(name: &str) -> Option<u64> {
     std::env::var(name).ok()?.parse().ok()
 }

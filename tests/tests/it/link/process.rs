@@ -491,9 +491,7 @@ fn between_jobs_the_printer_itself_is_asked() {
     assert_eq!(query.progress().state, JobState::None);
     assert_eq!(query.lines(PATIENCE).unwrap(), (Lines::IDLE, None));
     assert_eq!(query.printer(Ask::DeviceId, PATIENCE).unwrap(), Reply::OneWay);
-    let Reply::Bytes(bytes) = query.printer(Ask::Printer, PATIENCE).unwrap() else {
-        panic!("no answer")
-    };
+    let Reply::Bytes(bytes) = query.printer(Ask::Printer, PATIENCE).unwrap() else { panic!("no answer") };
     let status = Status::read(&bytes).unwrap();
     assert_eq!(status.errors, ["the cover is open; close it"]);
     assert_eq!(status.cartridges[0].ink, Some("white"));

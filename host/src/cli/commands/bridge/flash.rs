@@ -37,10 +37,15 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         None => installed::images()?.into_iter().map(|installed| installed.firmware).collect(),
     };
     if images.is_empty() {
-        let folders: Vec<String> = installed::folders().iter().map(|folder| folder.display().to_string()).collect();
+        let folders: Vec<String> =
+            installed::folders().iter().map(|folder| folder.display().to_string()).collect();
         let (board, file, target) = match flash::chip_there(args.to.as_ref(), &mut ThisComputer) {
             Some(chip) => (format!("This board is a {}: take", chip.board()), chip.image().0, chip.image().1),
-            None => ("Take".into(), "foilpress-bridge.uf2 for a Pico, foilpress-bridge-pico2.uf2 for a Pico 2", "TARGET"),
+            None => (
+                "Take".into(),
+                "foilpress-bridge.uf2 for a Pico, foilpress-bridge-pico2.uf2 for a Pico 2",
+                "TARGET",
+            ),
         };
         bail!(
             "no firmware came with this program (looked in {}). {board} {file} from a release, or build it in the project's folder with \

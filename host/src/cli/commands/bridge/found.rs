@@ -104,7 +104,8 @@ pub struct Found {
 }
 
 impl Found {
-    /// Asks bridge and, unless `quiet`, the printer. It is asked only while no job is open; a bridge that prints says so instead.
+    /// Asks bridge and, unless `quiet`, the printer. It is asked only while no job is open; a bridge that
+    /// prints says so instead.
     pub fn ask(address: &Address, quiet: bool) -> Result<Found> {
         Found::ask_on(&mut *address.open()?, quiet)
     }

@@ -1,9 +1,10 @@
 //! `foilpress bridge reset`: make a printer that may hold part of a job ready for the next one.
 //!
-//! A printer that has received half a job takes the next one for the rest of it and prints it as text. Its bridge knows, and resets it
-//! before anything else goes to it; but the sheet has to be taken out, and whoever has done that says so by this command. A job that is
-//! open at the bridge is given up, whoever has sent it, after a question: nothing else may help when its sender is gone and the printer
-//! takes no bytes. A printer without a bridge is reset by its switch, which is noted for every user and queue of this computer
+//! A printer that has received half a job takes the next one for the rest of it and prints it as text. Its
+//! bridge knows, and resets it before anything else goes to it; but the sheet has to be taken out, and
+//! whoever has done that says so by this command. A job that is open at the bridge is given up, whoever has
+//! sent it, after a question: nothing else may help when its sender is gone and the printer takes no bytes. A
+//! printer without a bridge is reset by its switch, which is noted for every user and queue of this computer
 //! ([`device::printers`]).
 
 use anyhow::{Result, bail};
