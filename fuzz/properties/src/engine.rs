@@ -2,7 +2,8 @@
 //!
 //! The input is a script: the jobs' data, then what happens. Its host repeats itself, forgets, resets the bridge and
 //! talks rubbish, but it never lies about a job's data; so a job that is done has printed what an undisturbed engine
-//! makes of them, and one that ended early has left the printer at the end of a whole job, or reset it.
+//! makes of them, and one that ended early has left the printer at the end of a whole job, or reset it. A printer
+//! of which nothing is known yet, and one that was without its supply, are reset before any byte.
 
 use super::frame::framed;
 use arbitrary::{Result, Unstructured};
@@ -34,7 +35,7 @@ pub fn check(bytes: &[u8]) {
         open: None,
         printed: Vec::new(),
         offered: Vec::new(),
-        must_reset: false,
+        must_reset: true,
     };
     while !script.is_empty() {
         if step(&mut bench, &mut boards, &mut script).is_err() {
@@ -127,6 +128,7 @@ fn header(script: &mut Unstructured<'_>) -> Result<Vec<u8>> {
 fn undisturbed(kind: JobKind, data: &[u8]) -> (Vec<u8>, JobState) {
     let mut board = Board::new();
     let mut engine = Engine::new(board.memory(), identity(1));
+    engine.wake(true, 0);
     let (mut reader, mut printed) = (Reader::new(), Vec::new());
     tell(&mut engine, &mut reader, &ToBridge::Begin { job: 9, kind, length: data.len() as u32 });
     loop {
@@ -174,7 +176,7 @@ struct Bench<'m, 'j> {
     printed: Vec<u8>,
     /// What has been taken of it, if it came through the plain interface.
     offered: Vec<u8>,
-    /// The printer stands inside a job: the next thing it gets must be a reset.
+    /// The printer stands inside a job, or nobody knows where: the next thing it gets must be a reset.
     must_reset: bool,
 }
 
@@ -331,6 +333,7 @@ fn step<'m>(
             let power = if script.ratio(7u8, 8u8)? { Lines::POWER } else { 0 };
             let lines = Lines(script.arbitrary::<u8>()? & !Lines::POWER | power);
             bench.engine.port(lines, lines.fault());
+            bench.must_reset |= power == 0;
         }
         16 => bench.answer(script)?,
         17 => match script.int_in_range(0..=2)? {

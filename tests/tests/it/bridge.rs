@@ -67,6 +67,7 @@ fn bridged(data: &[u8], cancel_at: Option<usize>) -> (Vec<u8>, JobState) {
     let mut decoder = Decoder::default();
     let memory = Memory { data: &mut queue, output: &mut output, band: &mut band, decoder: &mut decoder };
     let mut engine = Engine::new(memory, Identity { boot: 1, serial: 1, firmware: "test" });
+    engine.wake(true, 0);
     let (mut reader, mut frame) = (Reader::new(), [0; MAX]);
     let mut tell = |engine: &mut Engine<'_>, message: ToBridge<'_>| {
         let length = frame::write(&message, &mut frame).unwrap();
