@@ -41,6 +41,7 @@ pub(super) enum Cancel {
     Decided(u32),
 }
 
+#[derive(Clone, Copy)]
 pub(super) struct Job {
     pub(super) id: u32,
     pub(super) kind: JobKind,

@@ -28,7 +28,7 @@ impl Engine<'_> {
     }
 
     fn work_raw(&mut self) -> bool {
-        let Some(job) = &mut self.job else { return false };
+        let Some(job) = self.job else { return false };
         if job.must_stop() {
             if job.used > job.closed && job.used < job.settled && job.ends_at().is_none() {
                 self.pass_command();

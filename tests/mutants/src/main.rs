@@ -39,16 +39,20 @@ const DECIDE: [&str; 12] = [
 
 /// The switch in the bridge, and a checkpoint that is one call late for a fault that is planted.
 const SWITCH: &str = "
-extern crate std;
-pub(crate) fn mutant(number: u32) -> bool {
-    static NUMBER: std::sync::OnceLock<u32> = std::sync::OnceLock::new();
-    let read = || std::env::var(\"FOILPRESS_MUTANT\").ok().and_then(|text| text.parse().ok()).unwrap_or(0);
-    *NUMBER.get_or_init(read) == number
+mod switch {
+    extern crate std;
+    use crate::engine::Checkpoint;
+    pub(crate) fn mutant(number: u32) -> bool {
+        static NUMBER: std::sync::OnceLock<u32> = std::sync::OnceLock::new();
+        let read = || std::env::var(\"FOILPRESS_MUTANT\").ok().and_then(|text| text.parse().ok()).unwrap_or(0);
+        *NUMBER.get_or_init(read) == number
+    }
+    std::thread_local!(static LATE: core::cell::Cell<Option<Checkpoint>> = const { core::cell::Cell::new(None) });
+    pub(crate) fn late(now: Checkpoint) -> Checkpoint {
+        LATE.replace(Some(now)).unwrap_or(now)
+    }
 }
-pub(crate) fn late(now: engine::Checkpoint) -> engine::Checkpoint {
-    std::thread_local!(static LATE: core::cell::Cell<Option<engine::Checkpoint>> = const { core::cell::Cell::new(None) });
-    LATE.replace(Some(now)).unwrap_or(now)
-}
+pub(crate) use switch::{late, mutant};
 ";
 
 /// Seconds of the simulation for each.
@@ -153,7 +157,7 @@ fn build(place: &Path) -> Result<Vec<(PathBuf, PathBuf)>> {
         .args([
             "test",
             "--no-run",
-            "--message-format=json",
+            "--message-format=json-render-diagnostics",
             "-p",
             "foilpress-bridge",
             "-p",

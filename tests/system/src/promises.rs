@@ -177,6 +177,28 @@ impl Table {
     }
 }
 
+/// The doors and states in which each promise is tried, as rows of a document's table.
+pub fn tried() -> String {
+    let mut text = String::new();
+    for promise in Promise::ALL {
+        let mut rows: Vec<(Vec<State>, Vec<String>)> = Vec::new();
+        for door in Door::ALL {
+            let is_tried = |state: &State| cannot(promise, door, *state).is_none();
+            let states: Vec<State> = State::ALL.into_iter().filter(is_tried).collect();
+            match rows.iter_mut().find(|(known, _)| *known == states) {
+                _ if states.is_empty() => {}
+                Some((_, doors)) => doors.push(format!("{door:?}")),
+                None => rows.push((states, vec![format!("{door:?}")])),
+            }
+        }
+        for (states, doors) in rows {
+            let states: Vec<String> = states.iter().map(|state| format!("{state:?}")).collect();
+            let _ = writeln!(text, "| {promise:?} | {} | {} |", doors.join(", "), states.join(", "));
+        }
+    }
+    text
+}
+
 /// Why a promise cannot be endangered by this door in this state, if it cannot.
 pub fn cannot(promise: Promise, door: Door, state: State) -> Option<&'static str> {
     use Promise::*;
