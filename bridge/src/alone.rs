@@ -54,6 +54,9 @@ impl<F: Flash> Alone<F> {
         if alone.store.keeps_diary() {
             engine.keep_diary();
         }
+        if !remembers {
+            alone.store.lost_before().for_each(|job| engine.was_lost(job));
+        }
         let Some(Record { job, stored, end }) = alone.store.noted() else { return alone };
         if !remembers {
             engine.wake(end.is_some(), if end == Some(End::Legal) { 0 } else { job });

@@ -46,16 +46,16 @@ impl Standing {
         }
     }
 
-    /// The last byte of a legal end has crossed.
-    pub fn end(&mut self) {
-        if let Standing::InSheet(_) = self {
+    /// The last byte of this job's legal end has crossed. The end of another one says nothing.
+    pub fn end(&mut self, job: u32) {
+        if *self == Standing::InSheet(job) {
             *self = Standing::AtRest;
         }
     }
 
-    /// The sheet ends, and not legally: the printer waits for a rest that never comes.
-    pub fn tear(&mut self) {
-        if let Standing::InSheet(job) = *self {
+    /// This job's sheet ends, and not legally: the printer waits for a rest that never comes.
+    pub fn tear(&mut self, job: u32) {
+        if *self == Standing::InSheet(job) {
             *self = Standing::Unknown { job, due: job != QUESTION };
         }
     }
@@ -108,8 +108,8 @@ mod tests {
     #[derive(Clone, Copy, Debug)]
     enum Event {
         Enter(u32),
-        End,
-        Tear,
+        End(u32),
+        Tear(u32),
         Reset,
         LoseSupply(bool),
         Disturb,
@@ -118,8 +118,8 @@ mod tests {
     fn events() -> impl Strategy<Value = std::vec::Vec<Event>> {
         let one = prop_oneof![
             (0u32..5).prop_map(Event::Enter),
-            Just(Event::End),
-            Just(Event::Tear),
+            (0u32..5).prop_map(Event::End),
+            (0u32..5).prop_map(Event::Tear),
             Just(Event::Reset),
             any::<bool>().prop_map(Event::LoseSupply),
             Just(Event::Disturb),
@@ -136,8 +136,8 @@ mod tests {
                 let before = standing;
                 match event {
                     Event::Enter(job) => standing.enter(job),
-                    Event::End => standing.end(),
-                    Event::Tear => standing.tear(),
+                    Event::End(job) => standing.end(job),
+                    Event::Tear(job) => standing.tear(job),
                     Event::Reset => standing.reset(),
                     Event::LoseSupply(crossed) => standing.lose_supply(crossed),
                     Event::Disturb => standing.disturb(),
@@ -146,9 +146,10 @@ mod tests {
                     (before, after) if before == after => {}
                     (Standing::AtRest, Standing::InSheet(_)) => prop_assert!(matches!(event, Event::Enter(_))),
                     (_, Standing::InSheet(_)) => prop_assert!(false, "{before:?} to {standing:?} by {event:?}"),
-                    (Standing::InSheet(_), Standing::AtRest) => {
-                        prop_assert!(matches!(event, Event::End | Event::Reset));
-                    }
+                    (Standing::InSheet(job), Standing::AtRest) => match event {
+                        Event::End(ended) => prop_assert_eq!(ended, job),
+                        _ => prop_assert!(matches!(event, Event::Reset)),
+                    },
                     (_, Standing::AtRest) => prop_assert!(matches!(event, Event::Reset)),
                     (Standing::InSheet(job), Standing::Unknown { job: part, .. }) => {
                         prop_assert!(part == job || matches!(event, Event::LoseSupply(false)));

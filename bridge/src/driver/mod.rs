@@ -197,7 +197,9 @@ where
 
     /// Keeps where the job stands for the time after a reset, and writes to the log what has changed.
     fn keep(&mut self, engine: &Engine<'_>) {
-        let checkpoint = engine.checkpoint();
+        let mut checkpoint = engine.checkpoint();
+        // Of a job that is held what was given to the sender goes on.
+        checkpoint.flowing |= engine.is_ready() && self.board.in_flight() > 0;
         self.board.store(checkpoint);
         let state = (checkpoint.progress.job, checkpoint.progress.state);
         if self.logged.replace(state) != Some(state) && state.0 != 0 {

@@ -144,7 +144,7 @@ impl Checkpoint {
         let Progress { job, printed, .. } = self.progress;
         if self.flowing && self.progress.is_open() && self.past.iter().all(|past| past.job != job) {
             self.progress.state = JobState::Lost;
-            self.standing.tear();
+            self.standing.tear(job);
             if job != LOCAL && job != ALONE {
                 self.past.rotate_right(1);
                 self.past[0] = PastJob { job, state: JobState::Lost, printed };
@@ -280,7 +280,7 @@ impl<'m> Engine<'m> {
         engine.resume_job(&checkpoint);
         if engine.job.as_ref().map(|job| job.id) != Some(engine.standing.job()) {
             // What it was in goes on no more: a plain job, a question, or a job that ended as the board was reset.
-            engine.standing.tear();
+            engine.standing.tear(engine.standing.job());
         }
         engine
     }
@@ -332,9 +332,14 @@ impl<'m> Engine<'m> {
             ends_at: self.job.as_ref().and_then(Job::ends_at),
             standing: self.standing,
             one_way: self.one_way,
-            flowing: self.fault.is_none() && !self.output().is_empty(),
+            flowing: self.is_ready() && !self.output().is_empty(),
             past: self.past,
         }
+    }
+
+    /// Whether the printer takes bytes.
+    pub(crate) fn is_ready(&self) -> bool {
+        self.fault.is_none()
     }
 
     /// How an earlier job of the link has ended, if that is remembered.
@@ -453,7 +458,7 @@ impl<'m> Engine<'m> {
         match done.task {
             Task::Initialise => self.initialised(outcome != Outcome::Unnoticed),
             // The printer has half of the question.
-            Task::PrinterStatus => self.standing.tear(),
+            Task::PrinterStatus => self.standing.tear(QUESTION),
             Task::Drive { .. } | Task::Probe { .. } => self.standing.disturb(),
             Task::Configure(_) | Task::DeviceId | Task::Bootloader => {}
         }
@@ -476,7 +481,7 @@ impl<'m> Engine<'m> {
 
     /// The printer has taken none of the question's bytes, or all of them.
     pub fn end_question(&mut self) {
-        self.standing.end();
+        self.standing.end(QUESTION);
     }
 
     /// The printer was reset, with nothing in flight. One without its supply has not noticed.
@@ -488,9 +493,9 @@ impl<'m> Engine<'m> {
         {
             let begun = job.printed > 0;
             if begun {
-                self.standing.tear();
+                self.standing.tear(job.id);
             } else {
-                self.standing.end();
+                self.standing.end(job.id);
             }
             self.end(if begun { JobState::Lost } else { JobState::Cancelled });
         }
@@ -516,8 +521,13 @@ impl<'m> Engine<'m> {
         self.standing = if at_rest { Standing::AtRest } else { Standing::Unknown { job: lost, due: false } };
         if lost != QUESTION {
             self.last = Progress { job: lost, state: JobState::Lost, ..NOTHING };
-            self.remember(PastJob { job: lost, state: JobState::Lost, printed: 0 });
+            self.was_lost(lost);
         }
+    }
+
+    /// The diary has a job whose sheet was lost.
+    pub fn was_lost(&mut self, job: u32) {
+        self.remember(PastJob { job, state: JobState::Lost, printed: 0 });
     }
 
     /// Whether this job is known to be lost.

@@ -189,9 +189,9 @@ impl Engine<'_> {
         {
             // Of which no byte has crossed, it is as if it had not been.
             if needs_reset && job.printed > 0 {
-                self.standing.tear();
+                self.standing.tear(job.id);
             } else {
-                self.standing.end();
+                self.standing.end(job.id);
             }
             self.end(state);
             self.step_in();

@@ -82,6 +82,8 @@ pub(crate) struct World {
     pub(crate) taken: Vec<u8>,
     peripheral: Peripheral,
     phase: Phase,
+    /// Until when it waits for a host that leaves a negotiation.
+    patience: Option<u64>,
     sent_back: usize,
     /// A strobe before this is not seen: the last byte is still being worked on.
     ready_at: u64,
@@ -138,6 +140,7 @@ impl SimulatedPort {
             taken: Vec::new(),
             peripheral,
             phase: Phase::Forward,
+            patience: None,
             sent_back: 0,
             ready_at: 0,
             resets: 0,
@@ -263,6 +266,9 @@ impl World {
             }
         }
         self.now = until;
+        if self.patience.is_some_and(|at| at <= until) {
+            self.give_up();
+        }
     }
 
     /// Sets a line; true if that changed it.

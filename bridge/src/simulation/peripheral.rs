@@ -69,6 +69,9 @@ impl Default for Peripheral {
     }
 }
 
+/// For how long a printer waits for its host to go on (IEEE 1284, T_H).
+const HOST_NS: u64 = 1_000_000_000;
+
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Phase {
     /// Compatibility mode.
@@ -89,7 +92,10 @@ impl World {
         let due = self.responses.extract_if(.., |(at, _)| *at <= now);
         self.peripheral.reverse_data.extend(due.flat_map(|(_, bytes)| bytes));
         match (self.phase, line, level) {
-            (_, Line::Init, 0) => self.resets += 1,
+            (_, Line::Init, 0) => {
+                self.resets += 1;
+                self.give_up();
+            }
             (Phase::Forward, Line::Strobe, 0) => self.take(),
             (Phase::Forward, Line::AutoFeed, 0)
                 if self.level(Line::SelectIn) == 1 && self.peripheral.negotiates =>
@@ -146,6 +152,7 @@ impl World {
                     self.sent_back += nibbles / 2;
                 }
                 self.phase = Phase::Leaving { confirmed: false };
+                self.patience = Some(now + HOST_NS);
                 self.plan(late, Line::Fault, 1);
                 self.plan(late, Line::Busy, 0);
                 self.plan(late, Line::Ack, 0);
@@ -158,14 +165,30 @@ impl World {
                     self.plan(late, line, level);
                 }
             }
-            (Phase::Leaving { confirmed: true }, Line::AutoFeed, 1) => self.phase = Phase::Forward,
+            (Phase::Leaving { confirmed: true }, Line::AutoFeed, 1) => {
+                (self.phase, self.patience) = (Phase::Forward, None);
+            }
             _ => {}
+        }
+    }
+
+    /// The printer waits no longer for a host that has begun to leave, as one that restarts does: compatibility
+    /// mode again.
+    pub(super) fn give_up(&mut self) {
+        self.patience = None;
+        if self.phase != Phase::Forward {
+            self.phase = Phase::Forward;
+            for (line, level) in
+                [(Line::PaperOut, 0), (Line::Select, 1), (Line::Fault, 1), (Line::Busy, 0), (Line::Ack, 1)]
+            {
+                self.change(line, level);
+            }
         }
     }
 
     /// The printer's own switch. The lines of a printer that is off rest as the board's resistors have them.
     pub(super) fn switch(&mut self, on: bool) {
-        self.off = !on;
+        (self.off, self.patience) = (!on, None);
         (self.phase, self.sent_back, self.ready_at) = (Phase::Forward, self.peripheral.reverse_data.len(), 0);
         self.plan.clear();
         self.responses.clear();

@@ -26,6 +26,8 @@ const END: u32 = RECORD - 4;
 /// The words for an end.
 const ENDS: [(End, [u8; 4]); 2] = [(End::Legal, *b"end."), (End::Reset, *b"lost")];
 const BLANK: u8 = 0xff;
+/// Records before the last one that are told.
+const RECENT: usize = 8;
 /// Places that are tried when one does not keep what is written.
 const TRIES: u32 = 4;
 
@@ -103,6 +105,20 @@ impl Diary {
     /// The last record; none if nothing is known.
     pub(super) fn last(&self) -> Option<Record> {
         self.last
+    }
+
+    /// The records before the last one, the newest first, as far as they are there.
+    pub(super) fn before(&self, flash: &impl Flash) -> [Option<Record>; RECENT] {
+        let mut records = [None; RECENT];
+        for (sector, at) in (0..SECTORS).flat_map(|sector| (0..RECORDS).map(move |at| (sector, at))) {
+            if let Place::Whole(number, record) = look(flash, sector, at)
+                && let Some(back) = self.number.checked_sub(number + 1)
+                && let Some(place) = records.get_mut(back as usize)
+            {
+                *place = Some(record);
+            }
+        }
+        records
     }
 
     /// Notes that a job begins, or that nobody knows where the printer stands.

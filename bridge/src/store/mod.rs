@@ -26,6 +26,7 @@ mod flash;
 pub use diary::{End, Record};
 pub use flash::{Flash, NoFlash, PAGE, SECTOR};
 
+use crate::standing::QUESTION;
 use diary::Diary;
 use heapless::{String, Vec};
 use protocol::link::frame::checksum;
@@ -314,6 +315,13 @@ impl<F: Flash> Store<F> {
     /// What the diary says last; nothing where it says nothing that is known.
     pub fn noted(&self) -> Option<Record> {
         self.diary.last().filter(|_| self.keeps_diary())
+    }
+
+    /// Jobs before that one which have no legal end, the oldest first.
+    pub fn lost_before(&self) -> impl Iterator<Item = u32> {
+        let records = if self.keeps_diary() { self.diary.before(&self.flash) } else { Default::default() };
+        let lost = |record: &Record| record.end != Some(End::Legal) && record.job != QUESTION;
+        records.into_iter().rev().flatten().filter(lost).map(|record| record.job)
     }
 
     /// Notes that this job begins, unless that was noted last. `stored`: what it was stored as, or 0.

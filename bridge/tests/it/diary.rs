@@ -139,3 +139,25 @@ fn random_bytes_say_nothing_and_the_next_record_stands_there_all_the_same() {
         assert_eq!(noted(&flash), Some(Record { job: 7, stored: 3, end: None }));
     }
 }
+
+#[test]
+fn the_lost_ones_among_the_last_jobs_are_known_at_the_next_start() {
+    let mut random = seeded(55);
+    for _ in 0..100 {
+        let (flash, mut store) = with_jobs(random.random_range(0..2 * RECORDS), &mut random);
+        let lost: Vec<bool> = (0..20).map(|_| random.random_bool(0.4)).collect();
+        for (job, &lost) in (1_000..).zip(&lost) {
+            store.note_begin(job, 0);
+            match lost {
+                // It ends by a reset, or the supply goes.
+                true if random.random_bool(0.5) => store = Store::open(flash.clone()),
+                true => store.note_end(End::Reset),
+                false => store.note_end(End::Legal),
+            }
+        }
+        // The last one is told by itself.
+        let expected: Vec<u32> =
+            (1_000..).zip(&lost).skip(11).take(8).filter(|(_, lost)| **lost).map(|(job, _)| job).collect();
+        assert_eq!(Store::open(flash.clone()).lost_before().collect::<Vec<u32>>(), expected);
+    }
+}

@@ -67,9 +67,9 @@ const RATES: [(Kind, u32); 19] = [
     (Kind::Unplug, 400),
     (Kind::Kill, 400),
     (Kind::Watchdog, 400),
-    (Kind::Run, 300),
-    (Kind::Cut, 300),
-    (Kind::SwitchOff, 500),
+    (Kind::Run, 700),
+    (Kind::Cut, 700),
+    (Kind::SwitchOff, 1_200),
     (Kind::PaperOut, 400),
     (Kind::Age, 300),
 ];

@@ -30,10 +30,13 @@ impl Printer {
         !self.since.is_empty() && !is_a_whole_job(&self.since)
     }
 
-    /// It was reset, or switched off: the job that is lost with that, if it had a part of one.
+    /// It was reset, or switched off: the job that is lost with that, if it had a part of one. What has come
+    /// whole it prints.
     pub fn reset(&mut self) -> Option<u32> {
         let part = self.holds_a_part();
-        self.since.clear();
+        if part {
+            self.since.clear();
+        }
         part.then_some(self.owner)
     }
 

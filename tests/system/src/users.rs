@@ -12,13 +12,13 @@ use device::connection::transport::Transport;
 use device::connection::{Address, OpenError};
 use device::deliver::{self, Caller, Delivery, Failure, News, Question, store};
 use device::printers::Printers;
-use device::questions::query::Query;
+use device::questions::query::{Query, QueryError};
 use device::transit::Wish;
 use device::transit::finish::Sheet;
 use device::transit::journal::{Journal, fresh_number};
 use device::transit::session::{Outcome, Phase};
 use observe::{Observer, Silent};
-use protocol::link::message::{JobState, PAST};
+use protocol::link::message::{JobState, PAST, PastJob};
 use std::cell::{Cell, RefCell};
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -113,7 +113,7 @@ impl Caller for Person<'_> {
 /// A process of a user from its beginning to its end: it does something, whatever the numbers say, or what is
 /// open comes to its end.
 pub fn run(world: &Shared, user: usize, mut draw: Draw, calm: bool) {
-    let what = if calm { None } else { Some(draw.below(15)) };
+    let what = if calm { None } else { Some(draw.below(17)) };
     let shared = world.look().shared.clone();
     let ended = catch_unwind(AssertUnwindSafe(|| {
         let person = &Person {
@@ -137,9 +137,9 @@ pub fn run(world: &Shared, user: usize, mut draw: Draw, calm: bool) {
             }
             Some(0..=4) => desk.send(person),
             Some(what @ 5..=7) => desk.resume(person, what == 7),
-            Some(8 | 9) => desk.store(person),
-            Some(10..=12) => desk.print_stored(person),
-            Some(13) => desk.delete_stored(person),
+            Some(8..=10) => desk.store(person),
+            Some(11..=14) => desk.print_stored(person),
+            Some(15) => desk.delete_stored(person),
             Some(_) => desk.reset(person),
         }
     }));
@@ -279,27 +279,43 @@ impl Desk<'_> {
         }
     }
 
+    /// Prints a stored job, and asks for it until it has ended. As long as the board has not started anew the
+    /// order is said again each time: it is the same job.
     fn print_stored(&self, person: &Person<'_>) {
-        let Ok(mut link) = person.open(&address(), None) else { return };
-        let Ok(mut query) = Query::new(&mut *link, BRIDGE) else { return };
-        let Ok(shelf) = query.shelf(BRIDGE) else { return };
-        let Some(stored) = shelf.jobs.get(person.said.borrow_mut().below(shelf.jobs.len())) else { return };
-        let Some(&which) = person.world.look().shelf.get(&stored.job) else { return };
-        let number = fresh_number(stored.job, &person.world.look().step.to_le_bytes());
+        let Some((boot, stored)) = self.choose_stored(person) else { return };
+        let Some(&which) = person.world.look().shelf.get(&stored) else { return };
+        let number = fresh_number(stored, &person.world.look().step.to_le_bytes());
         person.world.look().meet(number, which, person.user, true);
-        let mut said = query.print_stored(number, stored.job, BRIDGE).map(|progress| progress.state);
-        while let Ok(JobState::Printing | JobState::Stopped(_) | JobState::Cancelling) = said {
-            person.pause(Duration::from_millis(500));
-            said = query
-                .ask_progress(BRIDGE)
-                .map(|progress| if progress.job == number { progress.state } else { JobState::None });
+        for _ in 0..100 {
+            let said = person.open(&address(), None).ok().and_then(|mut link| {
+                let mut query = Query::new(&mut *link, BRIDGE).ok()?;
+                let is_lost = |past: &&PastJob| past.job == number && past.state == JobState::Lost;
+                if query.past().any(|past| is_lost(&past)) {
+                    return Some(Ok(JobState::Lost));
+                }
+                let said = match query.bridge().boot == boot {
+                    true => query.print_stored(number, stored, BRIDGE),
+                    false => query.ask_progress(BRIDGE),
+                };
+                Some(said.map(|said| if said.job == number { said.state } else { JobState::None }))
+            });
+            match said {
+                Some(Ok(JobState::Done)) => return told(person.world, number, Outcome::Printed),
+                Some(Ok(JobState::Lost)) => return told(person.world, number, Outcome::Lost),
+                Some(Ok(JobState::None | JobState::Broken(_) | JobState::Cancelled))
+                | Some(Err(QueryError::NotStored(_) | QueryError::JobOpen(_))) => return,
+                _ => person.pause(Duration::from_secs(2)),
+            }
         }
-        let outcome = match said {
-            Ok(JobState::Done) => Outcome::Printed,
-            Ok(JobState::Lost) => Outcome::Lost,
-            _ => return,
-        };
-        told(person.world, number, outcome);
+    }
+
+    /// A job in the flash, and the start of the board that has it.
+    fn choose_stored(&self, person: &Person<'_>) -> Option<(u32, u32)> {
+        let mut link = person.open(&address(), None).ok()?;
+        let mut query = Query::new(&mut *link, BRIDGE).ok()?;
+        let shelf = query.shelf(BRIDGE).ok()?;
+        let stored = shelf.jobs.get(person.said.borrow_mut().below(shelf.jobs.len()))?;
+        Some((query.bridge().boot, stored.job))
     }
 
     fn delete_stored(&self, person: &Person<'_>) {
@@ -332,16 +348,17 @@ fn told(world: &Shared, number: u32, outcome: Outcome) {
         world.endanger(Promise::PrintedIsAtThePrinter, number);
     }
     let found = format!("job {number:08x} is told as {outcome:?}; {known:?}");
-    // A bridge remembers so many jobs, and whoever asks only behind them cannot be told; nor can one behind a
-    // cut and another sheet.
+    // A bridge remembers so many jobs, and whoever asks only behind them cannot be told; its diary remembers
+    // fewer, and those among them of which no byte came to cross.
     let is_long_ago = world.known.values().filter(|other| other.order > known.order).count() >= PAST;
-    let is_last = world.last_begun == number;
+    // Nor can one whose record in the flash has aged.
+    let is_recent = world.begun.iter().rev().take(3).any(|&begun| begun == number);
     let harmed = known.harmed || known.stored && world.has_aged();
     let promise = match outcome {
         Outcome::Forgotten if is_long_ago => return,
         Outcome::Printed if known.whole != 1 => Promise::PrintedIsAtThePrinter,
         Outcome::Cancelled | Outcome::Broken if known.torn => Promise::LossIsTold,
-        Outcome::Forgotten if known.torn && is_last => Promise::LossIsTold,
+        Outcome::Forgotten if known.torn && is_recent && !world.has_aged() => Promise::LossIsTold,
         Outcome::Lost | Outcome::Forgotten | Outcome::Broken if !harmed && !known.cancelled => {
             Promise::HarmlessCostsNothing
         }

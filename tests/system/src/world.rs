@@ -126,8 +126,8 @@ pub struct World {
     pub used: usize,
     /// Why the last job that was resumed did not end.
     pub last_failure: String,
-    /// The job whose sheet was begun last.
-    pub last_begun: u32,
+    /// The jobs whose sheets were begun, in this order.
+    pub begun: Vec<u32>,
     seed: u64,
     cable: SimulatedPort,
     resets: usize,
@@ -188,7 +188,7 @@ impl World {
             shared,
             used: draw.below(pool::SIZE),
             last_failure: String::new(),
-            last_begun: 0,
+            begun: Vec::new(),
             seed,
             cable,
             resets: 0,
@@ -278,9 +278,11 @@ impl World {
         }
     }
 
-    /// Something happens to the job that is open; `harms` if it may cost the sheet.
+    /// Something happens to the job that is open, or was when the board went down; `harms` if it may cost the
+    /// sheet.
     fn touch(&mut self, harms: bool) {
-        if let Some(known) = self.open_job().and_then(|number| self.known.get_mut(&number)) {
+        let open = if self.board.is_none() { Some(self.before.job) } else { self.open_job() };
+        if let Some(known) = open.and_then(|number| self.known.get_mut(&number)) {
             known.touched = true;
             known.harmed |= harms;
         }

@@ -157,7 +157,7 @@ impl World {
             self.printer.since.clear();
             self.printer.owner = number;
             if number != QUESTION {
-                self.last_begun = number;
+                self.begun.push(number);
             }
             if let Some(known) = self.known.get_mut(&number) {
                 known.begun += 1;

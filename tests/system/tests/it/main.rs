@@ -1,5 +1,7 @@
 //! The whole system under a seed that is drawn anew, and under the seeds that once broke a promise.
 
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 use system::promises::{Promise, Table, tried};
 use system::{report, run};
@@ -20,6 +22,15 @@ fn number(name: &str) -> Option<u64> {
     std::env::var(name).ok()?.parse().ok()
 }
 
+/// What all seeds together have come to.
+#[derive(Default)]
+struct Sum {
+    steps: u64,
+    sheets: usize,
+    broken: Vec<u64>,
+    endangered: Table,
+}
+
 #[test]
 fn every_promise_is_kept_whatever_happens() {
     let first = number("FOILPRESS_SEED").or_else(|| number("PROPTEST_RNG_SEED")).unwrap_or_else(|| {
@@ -28,21 +39,29 @@ fn every_promise_is_kept_whatever_happens() {
     });
     let time = Duration::from_secs(number("FOILPRESS_SECONDS").unwrap_or(EVERYDAY_SECONDS));
     println!("from seed {first} on, for {time:?}");
-    let start = Instant::now();
-    let (mut steps, mut sheets, mut broken, mut endangered) = (0, 0, Vec::new(), Table::default());
-    for seed in first.. {
-        let found = run(seed, None);
-        (steps, sheets) = (steps + found.steps, sheets + found.sheets);
-        endangered.add(&found.endangered);
-        if found.broken.is_some() {
-            println!("after {steps} steps in all, {:?}:\n{}", start.elapsed(), report(seed, &found));
-            broken.push(seed);
+    let (start, next, all) = (Instant::now(), AtomicU64::new(first), Mutex::new(Sum::default()));
+    // A world waits for one of its processes at a time: two at once keep two cores at work.
+    let live = || {
+        while start.elapsed() <= time && all.lock().expect("nobody fails").broken.len() < 5 {
+            let seed = next.fetch_add(1, Ordering::Relaxed);
+            let found = run(seed, None);
+            let told = found.broken.as_ref().map(|_| report(seed, &found));
+            let mut all = all.lock().expect("nobody fails");
+            (all.steps, all.sheets) = (all.steps + found.steps, all.sheets + found.sheets);
+            all.endangered.add(&found.endangered);
+            if let Some(told) = told {
+                println!("after {} steps in all, {:?}:\n{told}", all.steps, start.elapsed());
+                all.broken.push(seed);
+            }
         }
-        if start.elapsed() > time || broken.len() >= 5 {
-            println!("{} seeds, {steps} steps, {sheets} sheets in {:?}", seed - first + 1, start.elapsed());
-            break;
-        }
-    }
+    };
+    std::thread::scope(|scope| {
+        scope.spawn(live);
+        live();
+    });
+    let Sum { steps, sheets, broken, endangered } = all.into_inner().expect("nobody fails");
+    let seeds = next.into_inner() - first;
+    println!("{seeds} seeds, {steps} steps, {sheets} sheets in {:?}", start.elapsed());
     println!("{}", endangered.text());
     assert!(broken.is_empty(), "promises were broken under {broken:?}");
     if time >= Duration::from_secs(MINUTE) {
