@@ -172,8 +172,8 @@ impl World {
         }
     }
 
-    /// The printer waits no longer for a host that has begun to leave, as one that restarts does: compatibility
-    /// mode again.
+    /// The printer waits no longer for a host that has begun to leave, as one that restarts does:
+    /// compatibility mode again.
     pub(super) fn give_up(&mut self) {
         self.patience = None;
         if self.phase != Phase::Forward {

@@ -2,8 +2,8 @@
 //!
 //! The input is a script: the jobs' data, then what happens. Its host repeats itself, forgets, resets the bridge and
 //! talks rubbish, but it never lies about a job's data; so a job that is done has printed what an undisturbed engine
-//! makes of them, and one that ended early has left the printer at the end of a whole job, or reset it. A printer
-//! of which nothing is known yet, and one that was without its supply, are reset before any byte.
+//! makes of them, and one that ended early has left the printer at the end of a whole job, or reset it. A
+//! printer of which nothing is known yet, and one that was without its supply, are reset before any byte.
 
 use super::frame::framed;
 use arbitrary::{Result, Unstructured};

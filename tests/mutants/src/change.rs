@@ -18,6 +18,8 @@ pub struct Mutant {
     pub line: usize,
     /// What is changed into what.
     pub what: String,
+    /// It must not live.
+    pub must_die: bool,
 }
 
 /// Changes a source; the mutants in it are added to those before.
@@ -35,7 +37,7 @@ struct Changer<'m> {
 impl Changer<'_> {
     /// The number of another mutant.
     fn number(&mut self, line: usize, what: String) -> u32 {
-        self.mutants.push(Mutant { file: self.file.to_owned(), line, what });
+        self.mutants.push(Mutant { file: self.file.to_owned(), line, what, must_die: false });
         self.mutants.len() as u32
     }
 

@@ -78,12 +78,27 @@ impl Slots for Retained {
 #[derive(Clone)]
 struct AtCable {
     board: SimulatedBoard,
+    cable: SimulatedPort,
     kept: Arc<Mutex<(CheckpointStore<Retained>, u32)>>,
+    end: Arc<Mutex<End>>,
+}
+
+/// Whether the board comes to its end in the middle of a poll.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum End {
+    Far,
+    /// When it has given bytes to the sender: some of them cross, and nothing is kept any more.
+    Near,
+    Reached,
 }
 
 impl AtCable {
     fn kept(&self) -> MutexGuard<'_, (CheckpointStore<Retained>, u32)> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn end(&self) -> MutexGuard<'_, End> {
+        self.end.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Makes the marks of what has crossed, but for the last `unmarked`.
@@ -115,11 +130,17 @@ impl Sender for AtCable {
     }
 
     fn has_room(&self) -> bool {
-        self.board.has_room()
+        *self.end() != End::Reached && self.board.has_room()
     }
 
     fn give(&mut self, bytes: &[u8]) -> usize {
-        self.board.give(bytes)
+        let given = self.board.give(bytes);
+        let mut end = self.end();
+        if *end == End::Near && given > 0 {
+            self.cable.pass(200_000);
+            *end = End::Reached;
+        }
+        given
     }
 
     fn in_flight(&self) -> usize {
@@ -141,6 +162,9 @@ impl bridge::driver::Retained for AtCable {
     }
 
     fn store(&mut self, checkpoint: Checkpoint) {
+        if *self.end() == End::Reached {
+            return;
+        }
         self.mark_crossed(0);
         let crossed = self.board.marks();
         self.board.store(checkpoint);
@@ -211,8 +235,12 @@ impl Board {
             None => Engine::new(memory, identity),
         };
         let alone = Alone::open(flash.clone(), &mut engine, checkpoint.is_some());
-        let at_cable =
-            AtCable { board: SimulatedBoard::new(cable), kept: Arc::new(Mutex::new((checkpoints, 0))) };
+        let at_cable = AtCable {
+            board: SimulatedBoard::new(cable),
+            cable: cable.clone(),
+            kept: Arc::new(Mutex::new((checkpoints, 0))),
+            end: Arc::new(Mutex::new(End::Far)),
+        };
         let (pins, delay) = cable.pins();
         let driver = Driver::new(at_cable.clone(), Port::new(pins, delay));
         let (links, intake, id) = (Links::new(), Intake::new(), DeviceId::new());
@@ -222,6 +250,11 @@ impl Board {
     /// The driver looks; for how many µs there is nothing to do then.
     pub fn poll(&mut self) -> u32 {
         self.driver.poll(&mut self.engine, &mut self.id)
+    }
+
+    /// The next poll is the last one: the board stops when it has given bytes to the sender.
+    pub fn ends_in_next_poll(&mut self) {
+        *self.at_cable.end() = End::Near;
     }
 
     /// The board stops: its memory. A byte whose strobe is under way comes to its end; all are marked but the

@@ -113,6 +113,12 @@ impl World {
             self.cross(number);
         }
         if let Some(down) = down {
+            if draw.one_in_1000(500) {
+                if let Some(board) = &mut self.board {
+                    board.ends_in_next_poll();
+                }
+                self.poll();
+            }
             self.ended();
             // RUN is pressed while bytes flow: the strobe of the last one is over, and its mark is not made
             // yet.
