@@ -57,14 +57,20 @@ impl<F: Flash> Alone<F> {
         if !remembers {
             alone.store.lost_before().for_each(|job| engine.was_lost(job));
         }
-        let Some(Record { job, stored, end }) = alone.store.noted() else { return alone };
-        if !remembers {
-            engine.wake(end.is_some(), if end == Some(End::Legal) { 0 } else { job });
-        } else if engine.open_job() == Some(job)
-            && let Some(stored) = alone.find(|found| found.id() == stored)
-        {
-            engine.resume_from_store(stored.kind, stored.length);
-            alone.run = Some(alone.begin(job, stored));
+        match alone.store.noted() {
+            Some(Record { job, end, .. }) if !remembers => {
+                engine.wake(end.is_some(), if end == Some(End::Legal) { 0 } else { job });
+            }
+            Some(Record { job, stored, .. }) if engine.prints_from_store(job) => {
+                if let Some(stored) = alone.find(|found| found.id() == stored) {
+                    engine.resume_from_store(stored.kind, stored.length);
+                    alone.run = Some(alone.begin(job, stored));
+                }
+            }
+            _ => {}
+        }
+        if alone.run.is_none() {
+            engine.lost_in_store();
         }
         alone
     }

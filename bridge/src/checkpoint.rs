@@ -33,7 +33,7 @@ pub const PAST_SLOT: usize = 288;
 const HEAD: usize = 12;
 
 /// What of a checkpoint changes with every byte.
-type Position = (Progress, Option<u32>, Standing, bool, bool);
+type Position = (Progress, Option<u32>, Standing, bool, bool, bool);
 
 /// Memory that outlives a reset. Writes happen in the order in which they are asked for.
 pub trait Memory {
@@ -83,9 +83,9 @@ impl<M: Memory> CheckpointStore<M> {
         let crossed = (0..MARKS).take_while(|at| memory.is_marked((place + at) % MARKS)).count();
         #[expect(clippy::cast_possible_truncation, reason = "at most MARKS")]
         let count = crossed as u32;
-        let (mut progress, ends_at, standing, one_way, flowing): Position = position;
+        let (mut progress, ends_at, standing, one_way, flowing, from_store): Position = position;
         progress.printed = progress.printed.wrapping_add(count);
-        let checkpoint = Checkpoint { progress, ends_at, standing, one_way, flowing, past };
+        let checkpoint = Checkpoint { progress, ends_at, standing, one_way, flowing, from_store, past };
         let mut checkpoints = CheckpointStore { memory, number, place, last: None, past, past_number };
         checkpoints.store(checkpoint, place + crossed);
         // What a reset left between a slot and the clearing of its marks would be counted a turn of the ring later.
@@ -114,8 +114,8 @@ impl<M: Memory> CheckpointStore<M> {
             }
         }
         let number = self.number.wrapping_add(1);
-        let Checkpoint { progress, ends_at, standing, one_way, flowing, .. } = checkpoint;
-        let position: Position = (progress, ends_at, standing, one_way, flowing);
+        let Checkpoint { progress, ends_at, standing, one_way, flowing, from_store, .. } = checkpoint;
+        let position: Position = (progress, ends_at, standing, one_way, flowing, from_store);
         let Some(slot) = write(number, place, &position) else { return };
         self.number = number;
         self.memory.write((number % 2) as usize, slot);
@@ -256,13 +256,14 @@ mod tests {
             },
             one_way: printed.is_multiple_of(5),
             flowing: printed.is_multiple_of(7),
+            from_store: printed.is_multiple_of(11),
             past: [PastJob::NONE; PAST],
         }
     }
 
     fn position(checkpoint: Checkpoint) -> Position {
-        let Checkpoint { progress, ends_at, standing, one_way, flowing, .. } = checkpoint;
-        (progress, ends_at, standing, one_way, flowing)
+        let Checkpoint { progress, ends_at, standing, one_way, flowing, from_store, .. } = checkpoint;
+        (progress, ends_at, standing, one_way, flowing, from_store)
     }
 
     fn held() -> Held {
@@ -373,12 +374,12 @@ mod tests {
             row: u16::MAX,
         };
         let standing = Standing::Unknown { job: all, due: true };
-        let position: Position = (progress, Some(all), standing, true, true);
+        let position: Position = (progress, Some(all), standing, true, true, true);
         assert!(write::<SLOT>(all, MARKS - 1, &position).is_some());
         let state = JobState::Broken(Defect { at: all, what: DefectKind::Truncated });
         let past = [PastJob { job: all, state, printed: all }; PAST];
         assert!(write::<PAST_SLOT>(all, 0, &past).is_some());
-        let position: Position = (Progress { state, ..progress }, Some(all), standing, true, true);
+        let position: Position = (Progress { state, ..progress }, Some(all), standing, true, true, true);
         assert!(write::<SLOT>(all, MARKS - 1, &position).is_some());
     }
 

@@ -4,7 +4,7 @@
 //! A job goes to the store through the same window as a job for the port, and comes from it into that window; what is made of
 //! it at the port is made by the same code. Between the engine and the store stands [`crate::alone`].
 
-use super::job::{Cancel, Phase, Way, positions};
+use super::job::{Cancel, Job, Phase, Way, positions};
 use super::{ALONE, Engine, LOCAL};
 use crate::button::Press;
 use heapless::String;
@@ -155,6 +155,15 @@ impl Engine<'_> {
         if let Some(job) = self.job.as_mut().filter(|job| job.phase == Phase::Unknown) {
             (job.kind, job.length, job.way, job.phase) = (kind, length, Way::FromStore, Phase::Running);
             self.due.progress = true;
+        }
+    }
+
+    /// The job that was open at a reset of the board came from the store, and is not there any more.
+    pub fn lost_in_store(&mut self) {
+        let is_lost = |job: &&mut Job| job.way == Way::FromStore && job.phase == Phase::Unknown;
+        if let Some(job) = self.job.as_mut().filter(is_lost) {
+            job.phase = Phase::Running;
+            self.end_from_store();
         }
     }
 

@@ -131,6 +131,8 @@ pub struct Checkpoint {
     pub one_way: bool,
     /// Whether bytes were on their way to a printer that takes them.
     pub flowing: bool,
+    /// Whether the job's data come from the board's flash.
+    pub from_store: bool,
     /// The jobs of the link that have ended, the last one first.
     pub past: [PastJob; PAST],
 }
@@ -287,7 +289,7 @@ impl<'m> Engine<'m> {
 
     /// Opens the job that was open at a reset, as far as it can go on.
     fn resume_job(&mut self, checkpoint: &Checkpoint) {
-        let Checkpoint { progress, ends_at, .. } = *checkpoint;
+        let Checkpoint { progress, ends_at, from_store, .. } = *checkpoint;
         let ended = |state| Progress { state, limit: progress.accepted, ..progress };
         if progress.job == 0 || !progress.is_open() {
             self.last = progress;
@@ -309,7 +311,12 @@ impl<'m> Engine<'m> {
                 cancel: ends_at.map_or(Cancel::None, Cancel::Decided),
                 pass: progress.pass,
                 row: progress.row,
-                ..Job::new(progress.job, JobKind::Raw, 0, Way::ToPort)
+                ..Job::new(
+                    progress.job,
+                    JobKind::Raw,
+                    0,
+                    if from_store { Way::FromStore } else { Way::ToPort },
+                )
             });
         }
     }
@@ -333,6 +340,7 @@ impl<'m> Engine<'m> {
             standing: self.standing,
             one_way: self.one_way,
             flowing: self.is_ready() && !self.output().is_empty(),
+            from_store: self.job.as_ref().is_some_and(|job| job.way == Way::FromStore),
             past: self.past,
         }
     }

@@ -581,6 +581,48 @@ fn a_stored_job_whose_first_page_has_changed_is_broken_and_not_done() {
     }
 }
 
+/// The board restarts while it prints from its flash, and finds the job gone from there, or half of it: the
+/// job ends, and what the printer has of it is followed by a reset.
+#[test]
+fn a_stored_job_that_a_restart_does_not_find_again_ends_and_the_printer_is_reset() {
+    let mut random = seeded(33);
+    for (kind, most) in
+        [(JobKind::Raw, 0), (JobKind::Raw, 300_usize), (JobKind::Streams, 0), (JobKind::Streams, 300)]
+    {
+        for gone in [true, false] {
+            let (mut board, flash) = (Board::new(2048, 4096), ModelFlash::new(60, &mut random));
+            let (mut bridge, mut printer) = (Bridge::start(&mut board, &flash), Printer::default());
+            let planes = model::Planes::random(&mut random);
+            let data = if kind == JobKind::Raw { planes.printed() } else { planes.streams() };
+            let start = data[..data.len().min(100)].to_vec();
+            store(&mut bridge, &mut printer, &Job { id: 101, kind, data, expected: Vec::new() });
+            bridge.tell(ToBridge::PrintStored { job: 501, stored: 101 });
+            for _ in 0..200 {
+                bridge.poll();
+                bridge.engine.work();
+                let left = most.saturating_sub(printer.since.len());
+                printer.serve(&mut bridge.engine, left);
+            }
+            assert_eq!((bridge.progress().job, printer.since.len()), (501, most), "{kind:?}");
+            let before = bridge.engine.checkpoint();
+            if gone {
+                // Its record in the diary has aged.
+                (0..2 * 4096).step_by(32).for_each(|byte| flash.flip(byte, 0));
+            } else {
+                let at = flash.bytes().windows(start.len()).position(|piece| piece == start).expect("there");
+                flash.flip(at, 3);
+            }
+            let mut board = Board::new(2048, 4096);
+            let mut bridge = Bridge::restart(&mut board, &flash, before);
+            let resets = printer.resets;
+            settle(&mut bridge, &mut printer);
+            assert!(matches!(bridge.progress().state, JobState::Broken(_)), "{:?}", bridge.progress());
+            assert_eq!(printer.resets - resets, usize::from(most > 0), "{kind:?}, {most} bytes had crossed");
+            assert_eq!(bridge.engine.standing(), Standing::AtRest);
+        }
+    }
+}
+
 #[test]
 fn a_plain_job_that_the_loss_of_the_supply_cuts_in_two_leaves_a_note() {
     let mut random = seeded(32);

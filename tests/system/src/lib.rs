@@ -89,7 +89,8 @@ fn settle(world: &Shared) {
     while world.look().is_busy() {
         world.step(Duration::from_millis(20));
         if world.look().step > last {
-            world.look().fail(Promise::EveryJobEnds, "the bridge is still busy".into());
+            let found = format!("the bridge is still busy; {}", world.look().standing());
+            world.look().fail(Promise::EveryJobEnds, found);
             return;
         }
     }

@@ -13,6 +13,8 @@ pub struct Printer {
     pub owner: u32,
     /// Its +5 V are absent at the port until then.
     pub off_until: u64,
+    /// They are a whole job: what comes next begins another one.
+    complete: bool,
     /// From when until when it prints what has come whole.
     prints: (u64, u64),
     /// How long its status says idle behind a sheet, and for how long it then prints.
@@ -22,7 +24,7 @@ pub struct Printer {
 impl Printer {
     /// A printer between two jobs, with this lag.
     pub fn new(lag: (u64, u64)) -> Printer {
-        Printer { since: Vec::new(), owner: 0, off_until: 0, prints: (0, 0), lag }
+        Printer { since: Vec::new(), owner: 0, off_until: 0, complete: false, prints: (0, 0), lag }
     }
 
     /// Whether it waits for the rest of a sheet, or of a question.
@@ -37,7 +39,24 @@ impl Printer {
         if part {
             self.since.clear();
         }
+        self.settle();
         part.then_some(self.owner)
+    }
+
+    /// Something happened between its bytes: those that come next are of another job if it has a whole one.
+    pub fn settle(&mut self) {
+        self.complete = !self.since.is_empty() && !self.holds_a_part();
+    }
+
+    /// Whether bytes of this job begin a sheet.
+    pub fn begins(&self, job: u32) -> bool {
+        self.owner != job || self.since.is_empty() || self.complete
+    }
+
+    /// A sheet, or a question, begins.
+    pub fn begin(&mut self, job: u32) {
+        self.since.clear();
+        (self.owner, self.complete) = (job, false);
     }
 
     /// A whole sheet has come: when it will be out.

@@ -309,6 +309,7 @@ impl World {
         self.starts += 1;
         let boot = (Draw::new(self.seed ^ u64::from(self.starts)).number() as u32).max(1);
         self.flash.power_up();
+        self.printer.settle();
         let known = matches!(after, Some(Down::Watchdog | Down::Run));
         let from_outside = after != Some(Down::Watchdog);
         let retained = self.retained.clone();

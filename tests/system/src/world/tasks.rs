@@ -150,7 +150,7 @@ impl World {
         if bytes.is_empty() {
             return;
         }
-        let is_other = self.printer.owner != number || self.printer.since.is_empty();
+        let is_other = self.printer.begins(number);
         if is_other && self.printer.holds_a_part() {
             let promise = match number {
                 QUESTION => Promise::NoQuestionInASheet,
@@ -160,8 +160,7 @@ impl World {
             self.fail(promise, format!("job {number:08x} behind {count} bytes of job {owner:08x}"));
         }
         if is_other {
-            self.printer.since.clear();
-            self.printer.owner = number;
+            self.printer.begin(number);
             if number != QUESTION {
                 self.begun.push(number);
             }
