@@ -187,8 +187,8 @@ impl Engine<'_> {
         if let Phase::Ending { state, needs_reset } = job.phase
             && self.output.is_empty()
         {
-            // Of which no byte has crossed, it is as if it had not been. Behind a restart the printer may have more
-            // than has been made again, and an end that fits that is no end of what it has.
+            // Of which no byte has crossed, it is as if it had not been. Behind a restart the printer may
+            // have more than has been made again, and an end that fits that is no end of what it has.
             if (needs_reset || job.made < job.printed) && job.printed > 0 {
                 self.standing.tear(job.id);
             } else {
