@@ -21,7 +21,7 @@
 //! as many bytes as had crossed the port.
 //!
 //! **Where the printer stands** ([`Standing`]) is asked at one gate: [`Engine::output`] gives bytes of a job in its own sheet only, and
-//! [`Engine::step_in`] leads there. Nothing is given out while the printer's supply is absent.
+//! `step_in` leads there. Nothing is given out while the printer's supply is absent.
 //!
 //! **Two queues.** Accepted data wait in one, printer bytes in the other, so the port has work while a band is being
 //! decoded, and the link has credit while the printer is busy.

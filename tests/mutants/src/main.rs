@@ -1,7 +1,7 @@
 //! Whether a test notices when a decision of the bridge is another one: `cargo xtask mutants`.
 //!
 //! Problem: a test that passes proves nothing unless one would fail where the code is wrong. Method: a copy
-//! of the sources, in which each decision of the files that decide ([`DECIDE`]) is [changed](change) by a
+//! of the sources, in which each decision of the files that decide ([`DECIDE`]) is [changed](change()) by a
 //! switch, all of them in one build; then the bridge's tests and some seconds of the simulation of the whole
 //! system run once for each number, until one fails. Faults that were once found or planted by hand
 //! (`planted.toml`) are tried, too.

@@ -1,7 +1,7 @@
 //! The world: one clock, one step at a time, everything looked at behind each.
 //!
 //! Time is in µs. A step is a turn of every task of the board; it takes 2 ms while bytes flow, and up to 25 while nothing does. Processes
-//! of users act between steps ([`shared`]).
+//! of users act between steps ([`Shared`]).
 
 mod accidents;
 mod shared;
