@@ -252,9 +252,14 @@ impl Board {
         self.driver.poll(&mut self.engine, &mut self.id)
     }
 
-    /// The next poll is the last one: the board stops when it has given bytes to the sender.
-    pub fn ends_in_next_poll(&mut self) {
+    /// The board stops when it next gives bytes to the sender.
+    pub fn ends_with_next_bytes(&mut self) {
         *self.at_cable.end() = End::Near;
+    }
+
+    /// It has stopped so.
+    pub fn is_over(&self) -> bool {
+        *self.at_cable.end() == End::Reached
     }
 
     /// The board stops: its memory. A byte whose strobe is under way comes to its end; all are marked but the

@@ -1,6 +1,7 @@
 //! A turn of the board's tasks, with the printer at its cable and packets and frames at its other end.
 
 use super::{Down, MS, WAYS, World};
+use crate::board::Board;
 use crate::chance::Draw;
 use crate::pool;
 use crate::promises::Promise;
@@ -104,8 +105,17 @@ impl World {
         // One that goes down does so anywhere in its turn.
         let end_ns =
             if down.is_some() { end_ns - draw.below(time_us as usize * 1000) as u64 } else { end_ns };
+        if down.is_some()
+            && draw.one_in_1000(500)
+            && let Some(board) = &mut self.board
+        {
+            board.ends_with_next_bytes();
+        }
         while self.cable.now() < end_ns {
             self.poll();
+            if self.board.as_ref().is_some_and(Board::is_over) {
+                break;
+            }
             let left_ns = end_ns.saturating_sub(self.cable.now());
             let pause_us = self.pause_us.clamp(20, (2 * MS).max(time_us / 4));
             self.cable.pass(left_ns.min(pause_us * 1000));
@@ -113,12 +123,6 @@ impl World {
             self.cross(number);
         }
         if let Some(down) = down {
-            if draw.one_in_1000(500) {
-                if let Some(board) = &mut self.board {
-                    board.ends_in_next_poll();
-                }
-                self.poll();
-            }
             self.ended();
             // RUN is pressed while bytes flow: the strobe of the last one is over, and its mark is not made
             // yet.
