@@ -559,14 +559,14 @@ impl<'m> Engine<'m> {
 
     /// Whether there are bytes for a printer that takes them.
     fn has_bytes(&self) -> bool {
-        self.fault.is_none() && !self.held && !self.output.is_empty()
+        self.is_ready() && !self.held && !self.output.is_empty()
     }
 
     /// Takes the next step towards the sheet of the open job: a reset of a printer of which nothing is known, then the sheet itself. A
     /// printer with a fault waits for its end, since its supply may be gone for too short a time to count yet.
     pub(super) fn step_in(&mut self) {
         if let Standing::Unknown { due, .. } = self.standing
-            && (due && self.fault.is_none() || self.job.is_some() && self.has_bytes())
+            && (due && self.is_ready() || self.job.is_some() && self.has_bytes())
         {
             self.assign(Task::Initialise, None);
         }

@@ -14,6 +14,7 @@
 use super::NUMBERS;
 use super::flash::{Flash, PAGE, SECTOR};
 use protocol::link::frame::checksum;
+use protocol::link::message::PAST;
 
 /// Sectors of the diary, the first of the area.
 pub(super) const SECTORS: u32 = 2;
@@ -26,8 +27,9 @@ const END: u32 = RECORD - 4;
 /// The words for an end.
 const ENDS: [(End, [u8; 4]); 2] = [(End::Legal, *b"end."), (End::Reset, *b"lost")];
 const BLANK: u8 = 0xff;
-/// Records before the last one that are told.
-const RECENT: usize = 8;
+/// Records before the last one that are told: half of the jobs that a host is told of, so that those in the
+/// flash are among them, too.
+const RECENT: usize = PAST / 2;
 /// Places that are tried when one does not keep what is written.
 const TRIES: u32 = 4;
 

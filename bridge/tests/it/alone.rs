@@ -561,14 +561,19 @@ fn a_board_without_an_area_says_so() {
     assert_eq!(frame::decode::<ToHost>(bytes), Ok(expected));
 }
 
+/// The data of a drawn sheet.
+fn drawn(kind: JobKind, random: &mut ChaCha8Rng) -> Vec<u8> {
+    let planes = model::Planes::random(random);
+    if kind == JobKind::Raw { planes.printed() } else { planes.streams() }
+}
+
 #[test]
 fn a_stored_job_whose_first_page_has_changed_is_broken_and_not_done() {
     let mut random = seeded(31);
     for kind in [JobKind::Raw, JobKind::Streams] {
         let (mut board, flash) = (Board::new(2048, 4096), ModelFlash::new(60, &mut random));
         let (mut bridge, mut printer) = (Bridge::start(&mut board, &flash), Printer::default());
-        let planes = model::Planes::random(&mut random);
-        let data = if kind == JobKind::Raw { planes.printed() } else { planes.streams() };
+        let data = drawn(kind, &mut random);
         let start = data[..data.len().min(100)].to_vec();
         store(&mut bridge, &mut printer, &Job { id: 101, kind, data, expected: Vec::new() });
         let at = flash.bytes().windows(start.len()).position(|piece| piece == start).expect("it is there");
@@ -592,8 +597,7 @@ fn a_stored_job_that_a_restart_does_not_find_again_ends_and_the_printer_is_reset
         for gone in [true, false] {
             let (mut board, flash) = (Board::new(2048, 4096), ModelFlash::new(60, &mut random));
             let (mut bridge, mut printer) = (Bridge::start(&mut board, &flash), Printer::default());
-            let planes = model::Planes::random(&mut random);
-            let data = if kind == JobKind::Raw { planes.printed() } else { planes.streams() };
+            let data = drawn(kind, &mut random);
             let start = data[..data.len().min(100)].to_vec();
             store(&mut bridge, &mut printer, &Job { id: 101, kind, data, expected: Vec::new() });
             bridge.tell(ToBridge::PrintStored { job: 501, stored: 101 });
