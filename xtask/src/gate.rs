@@ -4,9 +4,10 @@
 //! Method: every step runs, whatever failed before, and has its time said. What the tests need is fetched and
 //! built beside the lints, for much of that is waiting; the tests then run together, those on the emulator
 //! and in the browser beside the others. Tests that take real time are marked `#[ignore]` with the reason
-//! `real time`: they are built like the others, and `--full` runs them, too, with the lints for other systems
-//! and the Debian package. At the end stand the seconds of each step, the slowest tests, the tests that were
-//! left out because something is missing on this computer ([`needs`]), and the steps that failed.
+//! `real time`: they are built like the others, and `--full` runs them, too, with the lints for other
+//! systems, the Debian package and a drawn tenth of the mutants. At the end stand the seconds of each step,
+//! the slowest tests, the tests that were left out because something is missing on this computer
+//! ([`needs`]), and the steps that failed.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -19,7 +20,7 @@ use anyhow::{Context, Result};
 
 use crate::firmware::BARE_METAL;
 use crate::runner::Runner;
-use crate::{cargo, command, emulator, foreign, package, preview, queue, succeed};
+use crate::{cargo, command, emulator, foreign, mutants, package, preview, queue, succeed};
 
 /// Names the list of tests that were left out; `.cargo/config.toml` sets it.
 const SKIPS: &str = "FOILPRESS_SKIPS";
@@ -98,6 +99,9 @@ pub fn run(root: &Path, is_full: bool) -> ExitCode {
         scope.spawn(|| gate.step("documentation and its examples", || runner.documentation()));
         gate.step("tests", || runner.all())
     });
+    if is_full && gate.failed().is_empty() {
+        gate.step("a tenth of the mutants", || succeed(runner.seeded(&mut mutants(&["--part"]))));
+    }
     // The package is tried with the tests of print queues: where they fail, it would.
     if is_full && gate.failed().is_empty() {
         gate.step("package", || package::run_where_possible(root, &runner.program()));

@@ -99,7 +99,7 @@ fn main() -> ExitCode {
         Task::Test { full } => gate::run(root, full),
         Task::Bench => finish(succeed(&mut cargo(&["bench", "--workspace", "--locked"]))),
         Task::Firmware => finish(firmware::build_possible(root)),
-        Task::Mutants { which } => finish(mutants(&which)),
+        Task::Mutants { which } => finish(succeed(&mut mutants(&which))),
         Task::Emulator { serve: true } => finish(emulator::serve(root)),
         Task::Emulator { serve: false } => finish(emulator::alone(root)),
         Task::Preview => finish(preview::run(root)),
@@ -112,8 +112,10 @@ fn main() -> ExitCode {
 }
 
 /// Tries the mutants of these numbers, or all.
-fn mutants(which: &[String]) -> anyhow::Result<()> {
-    succeed(cargo(&["run", "--locked", "--release", "--package", "foilpress-mutants", "--"]).args(which))
+fn mutants(which: &[impl AsRef<std::ffi::OsStr>]) -> Command {
+    let mut run = cargo(&["run", "--locked", "--release", "--package", "foilpress-mutants", "--"]);
+    run.args(which);
+    run
 }
 
 /// Checks licences, advisories, bans and sources of dependencies by `deny.toml`.

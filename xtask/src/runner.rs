@@ -57,7 +57,7 @@ impl<'a> Runner<'a> {
         }
         let mut environment = vec![(PROGRAM, program(root).into_os_string())];
         if env::var_os(SECONDS).is_none() {
-            environment.push((SECONDS, if is_full { "1800" } else { "20" }.into()));
+            environment.push((SECONDS, if is_full { "900" } else { "20" }.into()));
         }
         if is_full {
             environment.push(("FOILPRESS_FULL", "1".into()));
@@ -89,6 +89,12 @@ impl<'a> Runner<'a> {
         let set = self.environment.iter().find(|(name, _)| *name == CASES).map(|(_, cases)| cases.clone());
         let cases = set.or_else(|| env::var_os(CASES)).unwrap_or_else(|| "256".into());
         format!("property tests repeat with {CASES}={} {SEED}={seed}", cases.display())
+    }
+
+    /// Gives a command the seed that was [drawn](Runner::draw).
+    pub fn seeded<'c>(&self, command: &'c mut Command) -> &'c mut Command {
+        let seed = self.environment.iter().rfind(|(name, _)| *name == SEED);
+        command.envs(seed.map(|(name, value)| (name, value)))
     }
 
     /// The program as the tests' build leaves it.

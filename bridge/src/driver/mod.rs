@@ -14,6 +14,7 @@
 //! processor, with another handshake or when some status lines are not heeded. The port on pins also does everything between
 //! jobs: device ID, status, reset, wiring test.
 //!
+//! Whenever the board begins to drive the cable, it first leads the printer out of a conversation.
 //! While the printer's +5 V is absent nothing is strobed: the engine gives no bytes, the sender gets none and strobes none of
 //! those it has, and they are taken back when the supply counts as gone. From then on the output buffers let go of the cable,
 //! so that the inputs of a printer that is off are not fed, until the supply is back or the processor has work at the pins.
@@ -74,6 +75,8 @@ enum Purpose {
     DeviceId,
     /// The status question.
     Answer,
+    /// Nobody: a printer that may be in a conversation is led out of it.
+    WayBack,
 }
 
 /// The printer being read.
@@ -276,8 +279,12 @@ where
             if self.owner != Owner::WiringTest && self.talk.is_none() && self.question.is_none() {
                 self.drive(false);
             }
-        } else if heeded.high(Lines::POWER) {
-            self.drive(true);
+        } else if heeded.high(Lines::POWER) && !self.driving {
+            // A board that went down may have been in a conversation, and a printer that is in one still
+            // takes no bytes, whatever its lines show.
+            self.take_pins(engine);
+            let (conversation, text) = (Conversation::way_back(self.board.now_us()), Text::new());
+            self.talk = Some(Talk { purpose: Purpose::WayBack, conversation, text, before: 0 });
         }
         engine.port(self.lines, fault);
     }
@@ -461,6 +468,7 @@ where
         // An ID that breaks off is of use all the same.
         let whole = matches!(error, None | Some(ReverseError::Silent(_)));
         match purpose {
+            Purpose::WayBack => self.release_pins(),
             Purpose::Introduction => {
                 let told = whole && id.learn(&text);
                 self.board.log(if told { Event::DeviceId(text.len()) } else { Event::NoDeviceId });

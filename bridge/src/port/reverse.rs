@@ -57,7 +57,7 @@ const ANSWER_US: u64 = 40_000;
 const LOOK_US: u32 = 1;
 
 /// Looks at the lines before [`Port::converse`] returns to its caller.
-const LOOKS: u32 = 150;
+const LOOKS: u32 = 75;
 
 /// What the printer is waited for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -96,6 +96,18 @@ impl Conversation {
     /// One that has not begun.
     pub fn new(what: Reverse) -> Self {
         Conversation { what, event: Event::Begin, since_us: 0, low: None, count: 0, outcome: Ok(0) }
+    }
+
+    /// The way back out of one that somebody else has begun: event 22, which [rest](Port::rest) makes, was
+    /// now. Nothing is read, so its outcome is [`ReverseError::NotIdle`].
+    pub fn way_back(now_us: u64) -> Self {
+        let outcome = Err(ReverseError::NotIdle);
+        Conversation {
+            event: Event::Leaving,
+            since_us: now_us,
+            outcome,
+            ..Conversation::new(Reverse::Answer)
+        }
     }
 }
 

@@ -216,6 +216,11 @@ impl Sender for SimulatedBoard {
         }
         let count = bytes.len().min(CHUNK);
         assert!(world.strobing.connected, "bytes for a sender that has no pins");
+        let is_kept = world.checkpoint.is_some_and(|checkpoint| checkpoint.flowing);
+        assert!(
+            is_kept || !world.is_ready() || world.buffers.in_flight() > 0,
+            "bytes flow, and nobody has kept that"
+        );
         world.strobing.bytes.extend(&bytes[..count]);
         world.buffers.fill(count as u32);
         count

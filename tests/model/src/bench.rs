@@ -129,7 +129,7 @@ impl<'m> Bench<'m> {
 
     /// Lets time pass until something is said that begins so; gives the rest of it, and removes it.
     pub fn hear(&mut self, start: &str) -> String {
-        for _ in 0..100_000 {
+        for _ in 0..200_000 {
             if let Some(at) = self.said.iter().position(|said| said.starts_with(start)) {
                 return self.said.remove(at)[start.len()..].to_owned();
             }

@@ -37,6 +37,9 @@ const WAYS: [Way; USERS] = [Way::Serial, Way::Bulk];
 /// Sectors of the flash.
 const SECTORS: usize = 24;
 const MS: u64 = 1000;
+/// Half a question that was put so shortly before the supply goes no bridge can know of
+/// (`docs/decisions/where-the-printer-stands.md`).
+const UNNOTED: u64 = 10 * MS;
 /// What is not over by then never is.
 const LAST_STEP: u64 = 2_000_000;
 
@@ -155,6 +158,8 @@ pub struct World {
     readers: [Reader; USERS],
     /// The job that was last seen to ask for bytes while the printer had a part of another one.
     asked_into: Option<u32>,
+    /// When a byte of a question last crossed.
+    asked_at: u64,
     before: Progress,
 }
 
@@ -208,6 +213,7 @@ impl World {
             aged: false,
             readers: [const { Reader::new() }; USERS],
             asked_into: None,
+            asked_at: 0,
             before: NOTHING,
         };
         world.start(None);
@@ -323,6 +329,9 @@ impl World {
         let Some(board) = self.board.take() else { return };
         self.memory = Some(board.stop(unmarked));
         if how == Down::Cut {
+            if self.printer.owner == QUESTION && self.now - self.asked_at <= UNNOTED {
+                self.lose_part();
+            }
             // Its memory holds anything.
             self.retained = Retained::new((draw.number() % 256) as u8);
             for known in self.known.values_mut().filter(|known| !known.told) {
@@ -393,10 +402,10 @@ impl World {
         todo
     }
 
-    /// Everything is well from now on.
+    /// Nothing happens any more; a printer that is off stays so until its time.
     pub fn calm(&mut self) {
         self.chance.calm();
-        (self.printer.off_until, self.pulled_until) = (0, 0);
+        self.pulled_until = 0;
     }
 
     /// Whether a bit of the flash has changed.

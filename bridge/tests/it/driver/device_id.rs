@@ -5,7 +5,7 @@ use super::{ID, events, foreign, introducing, negotiations, send, text};
 use bridge::driver::Event;
 use bridge::port::Timing;
 use bridge::printer_class::DeviceId;
-use bridge::simulation::{Line, Peripheral, check};
+use bridge::simulation::{Line, Peripheral, SimulatedPort, check};
 use model::bench::{Bench, MS};
 use model::{Board, seeded};
 use protocol::link::message::{Answer, Ask, Fault, JobState, ToBridge};
@@ -157,4 +157,31 @@ fn a_job_that_comes_about_when_the_printer_is_asked_for_its_device_id_loses_noth
         assert_eq!(events(&bench).len(), 1);
         assert_eq!(check(&bench.cable.edges(), &Timing::DEFAULT), []);
     }
+}
+
+#[test]
+fn a_board_that_restarts_in_the_middle_of_a_conversation_ends_it_before_the_next_byte() {
+    let mut steps = 0;
+    loop {
+        let cable = SimulatedPort::new(Peripheral { answer_after: 300_000, ..introducing(ID) });
+        let mut board = Board::new(4096, 4096);
+        let mut bench = Bench::on(&cable, &mut board, None);
+        while negotiations(&bench) == 0 {
+            bench.turn();
+        }
+        (0..steps).for_each(|_| bench.turn());
+        if !events(&bench).is_empty() {
+            break;
+        }
+        steps += 1;
+        let checkpoint = bench.board.clone().reset();
+        let mut board = Board::new(4096, 4096);
+        let mut bench = Bench::on(&cable, &mut board, checkpoint);
+        let bytes = foreign(2_000);
+        send(&mut bench, 7, &bytes);
+        bench.pass(100 * MS);
+        assert_eq!((bench.cable.taken(), bench.state()), (bytes, JobState::Done), "after {steps} steps");
+        assert_eq!(cable.resets(), 0, "a sheet that is being printed would be lost");
+    }
+    assert!(steps > 20, "{steps} steps");
 }

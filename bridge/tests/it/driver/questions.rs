@@ -166,12 +166,12 @@ fn the_printer_is_asked_only_when_it_is_known_to_stand_between_two_jobs() {
     assert_eq!(bench.ask(8, Ask::DeviceId), unsure, "a negotiation may disturb it");
     // Behind a reset or a job it does.
     bench.tell(&ToBridge::Initialise { request: 7 });
-    bench.pass(10 * MS);
+    bench.pass(60 * MS);
     assert_eq!(bench.ask(2, Ask::Printer), whole);
     let mut board = Board::new(4096, 4096);
     let mut bench = Bench::unaware(&mut board, peripheral());
     send(&mut bench, 7, b"text");
-    bench.pass(10 * MS);
+    bench.pass(60 * MS);
     assert_eq!(bench.ask(3, Ask::Printer), whole);
     let checkpoint = bench.board.clone().reset();
     let mut board = Board::new(4096, 4096);
@@ -189,7 +189,7 @@ fn the_printer_is_asked_only_when_it_is_known_to_stand_between_two_jobs() {
     let mut bench = Bench::unaware(&mut board, peripheral());
     bench.tell(&ToBridge::Begin { job: 7, kind: JobKind::Raw, length: 9 });
     bench.tell(&ToBridge::Cancel { job: 7 });
-    bench.pass(10 * MS);
+    bench.pass(60 * MS);
     assert_eq!((bench.state(), bench.ask(6, Ask::Printer)), (JobState::Cancelled, unsure.clone()));
     // In the middle of a row, too.
     send(&mut bench, 8, &foreign(3_000));

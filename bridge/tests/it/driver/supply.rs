@@ -97,6 +97,7 @@ fn bytes_in_the_strobe_buffers_when_the_supply_goes_are_counted_as_they_are() {
         let mut board = Board::new(4096, 4096);
         let mut bench =
             Bench::new(&mut board, Peripheral { work: 1_000 + step * 37, ..Peripheral::default() });
+        bench.pass(60 * MS);
         send(&mut bench, 7, &bytes);
         bench.pass(2 * MS);
         bench.cable.plan(step * 53, Line::Power, 0);
@@ -107,7 +108,7 @@ fn bytes_in_the_strobe_buffers_when_the_supply_goes_are_counted_as_they_are() {
         assert_eq!((bench.state(), printed), (JobState::Lost, bench.cable.taken().len()), "step {step}");
         assert_eq!((at_the_fall, driven_without_supply(&bench)), (printed, 0), "step {step}");
         bench.cable.plan(0, Line::Power, 1);
-        bench.pass(10 * MS);
+        bench.pass(60 * MS);
         send(&mut bench, 8, b"next");
         bench.pass(10 * MS);
         assert_eq!((bench.state(), bench.cable.resets()), (JobState::Done, 1));
@@ -193,7 +194,7 @@ fn the_cable_is_driven_only_while_the_printer_has_its_supply_or_is_worked_on() {
         bench.cable.plan(0, Line::Power, 1);
         bench.pass(2 * MS);
         assert!(drives(&bench), "{handshake:?}: switched on");
-        bench.pass(20 * MS);
+        bench.pass(60 * MS);
         assert_eq!((bench.state(), bench.cable.taken()), (JobState::Done, foreign(700)), "{handshake:?}");
         for (dropout_ms, stays) in [(17, true), (24, false)] {
             bench.cable.plan(0, Line::Power, 0);

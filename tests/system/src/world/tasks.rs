@@ -177,8 +177,11 @@ impl World {
             }
         }
         self.printer.since.extend_from_slice(&bytes);
-        if number == QUESTION && self.printer.since.len().is_multiple_of(2) {
-            self.printer.since.clear();
+        if number == QUESTION {
+            self.asked_at = self.now;
+            if self.printer.since.len().is_multiple_of(2) {
+                self.printer.since.clear();
+            }
         }
     }
 
