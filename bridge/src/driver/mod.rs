@@ -14,7 +14,7 @@
 //! processor, with another handshake or when some status lines are not heeded. The port on pins also does everything between
 //! jobs: device ID, status, reset, wiring test.
 //!
-//! Whenever the board begins to drive the cable, it first leads the printer out of a conversation.
+//! When the board first drives the cable, it leads the printer out of a conversation that it may be in.
 //! While the printer's +5 V is absent nothing is strobed: the engine gives no bytes, the sender gets none and strobes none of
 //! those it has, and they are taken back when the supply counts as gone. From then on the output buffers let go of the cable,
 //! so that the inputs of a printer that is off are not fed, until the supply is back or the processor has work at the pins.
@@ -101,6 +101,8 @@ pub struct Driver<B, D, O, I, A, T> {
     supply: Supply,
     /// The output buffers drive the cable.
     driving: bool,
+    /// The printer was led out of what an earlier start of the board may have begun.
+    met: bool,
     /// Why the processor could not send.
     stop: Option<Fault>,
     introduction: Introduction,
@@ -136,6 +138,7 @@ where
             moved_us: now_us,
             supply: Supply::new(now_us),
             driving: false,
+            met: false,
             stop: None,
             introduction: Introduction::Waiting,
             question: None,
@@ -259,7 +262,7 @@ where
     fn look(&mut self, engine: &mut Engine<'_>, now_us: u64) {
         let lines = self.board.lines();
         self.lines = match self.talk {
-            None => lines,
+            None | Some(Talk { purpose: Purpose::WayBack, .. }) => lines,
             Some(_) => Lines(self.lines.0 & !Lines::POWER | lines.0 & Lines::POWER),
         };
         let heeded = self.lines.heeding(self.heed);
@@ -276,17 +279,25 @@ where
                 let sent = self.board.stop();
                 self.consumed(sent, engine);
             }
-            if self.owner != Owner::WiringTest && self.talk.is_none() && self.question.is_none() {
+            if self.is_free() {
                 self.drive(false);
             }
-        } else if heeded.high(Lines::POWER) && !self.driving {
+        } else if heeded.high(Lines::POWER) && !self.met && self.is_free() {
             // A board that went down may have been in a conversation, and a printer that is in one still
             // takes no bytes, whatever its lines show.
+            self.met = true;
             self.take_pins(engine);
             let (conversation, text) = (Conversation::way_back(self.board.now_us()), Text::new());
             self.talk = Some(Talk { purpose: Purpose::WayBack, conversation, text, before: 0 });
+        } else if heeded.high(Lines::POWER) {
+            self.drive(true);
         }
         engine.port(self.lines, fault);
+    }
+
+    /// Whether the pins are nobody's: no wiring test, no conversation, no question.
+    fn is_free(&self) -> bool {
+        self.owner != Owner::WiringTest && self.talk.is_none() && self.question.is_none()
     }
 
     /// Asks a printer that has been switched on for its device ID, when it is time and known to do no harm.

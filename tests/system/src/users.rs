@@ -274,6 +274,7 @@ impl Desk<'_> {
 
     fn store(&self, person: &Person<'_>) {
         let which = person.world.look().fresh();
+        person.world.look().numbered += 1;
         if let Ok(number) = store::store(pool::packed(which), &address(), person) {
             person.world.look().shelf.insert(number, which);
         }
@@ -350,7 +351,7 @@ fn told(world: &Shared, number: u32, outcome: Outcome) {
     let found = format!("job {number:08x} is told as {outcome:?}; {known:?}");
     // A bridge remembers so many jobs, and whoever asks only behind them cannot be told; its diary remembers
     // fewer, and those among them of which no byte came to cross.
-    let is_long_ago = world.known.values().filter(|other| other.order > known.order).count() >= PAST;
+    let is_long_ago = world.numbered - known.order > PAST;
     // Nor can one whose record in the flash has aged.
     let is_recent = world.begun.iter().rev().take(3).any(|&begun| begun == number);
     let harmed = known.harmed || known.stored && world.has_aged();

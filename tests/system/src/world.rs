@@ -103,6 +103,8 @@ pub struct World {
     pub step: u64,
     /// What happens.
     pub chance: Chance,
+    /// Jobs that the board may have had, printed or stored.
+    pub numbered: usize,
     /// Jobs by their number.
     pub known: BTreeMap<u32, Known>,
     /// Jobs in the flash by their number there.
@@ -180,6 +182,7 @@ impl World {
             now: 1_000_000,
             step: 0,
             chance,
+            numbered: 0,
             known: BTreeMap::new(),
             shelf: BTreeMap::new(),
             printer: Printer::new(lag),
@@ -239,7 +242,11 @@ impl World {
 
     /// A user sends this job under this number.
     pub fn meet(&mut self, number: u32, which: usize, user: usize, stored: bool) {
-        let order = self.known.len();
+        if self.known.contains_key(&number) {
+            return;
+        }
+        let order = self.numbered;
+        self.numbered += 1;
         let known = Known {
             order,
             which,
@@ -254,7 +261,7 @@ impl World {
             touched: false,
             told: false,
         };
-        self.known.entry(number).or_insert(known);
+        self.known.insert(number, known);
     }
 
     /// A promise could break now, by the door of this job.

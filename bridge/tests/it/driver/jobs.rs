@@ -210,7 +210,7 @@ fn a_line_that_is_not_heeded_stops_nothing() {
     bench.tell(&ToBridge::Configure(PortSettings { heed, ..Timing::DEFAULT.settings() }));
     bench.turn();
     send(&mut bench, 7, b"text");
-    bench.pass(10 * MS);
+    bench.pass(60 * MS);
     assert_eq!((bench.cable.taken(), bench.state()), (b"text".to_vec(), JobState::Done));
 }
 

@@ -95,6 +95,8 @@ impl Delivery<'_> {
         match query.standing() {
             (Standing::AT_REST, _) => return Ok(()),
             (_, 0) if fault.is_some() => return Ok(()),
+            // Whoever switches it on stands before it, and the bridge resets it then.
+            _ if fault == Some(Fault::PowerOff) => return Ok(()),
             (_, 0) => {}
             (_, job) => {
                 let owed = ResetOwed { printer: Printer::Bridge(query.bridge().serial), job };
