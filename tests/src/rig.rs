@@ -244,6 +244,14 @@ pub fn play(scenario: &Scenario, rig: &mut Rig, bridge: &Bridge<'_>) -> io::Resu
     }
     rig.tell(&Order::Begin { work_ns: scenario.work_ns, bytes: first })?;
     if scenario.ends == End::Asked {
+        // A printer that has been off may be another one, of which nobody knows where it stands.
+        let reset = bridge.command(&["bridge", "reset", "--to", bridge.address]).output()?;
+        if !reset.status.success() {
+            return Err(wrong(format!(
+                "the bridge is not reset: {}",
+                String::from_utf8_lossy(&reset.stderr)
+            )));
+        }
         let start = Instant::now();
         loop {
             let output = bridge.command(&["bridge", "status", "--to", bridge.address]).output()?;
