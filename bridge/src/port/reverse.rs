@@ -56,7 +56,8 @@ const ANSWER_US: u64 = 40_000;
 /// Between two looks, in µs.
 const LOOK_US: u32 = 1;
 
-/// Looks at the lines before [`Port::converse`] returns to its caller.
+/// Looks at the lines before [`Port::converse`] returns to its caller: an RP2040 takes 10 µs for each, and no
+/// task may keep it for a millisecond.
 const LOOKS: u32 = 75;
 
 /// What the printer is waited for.

@@ -10,6 +10,8 @@ pub struct Bridge {
     served: served::Bridge,
 }
 
+const INKS: [Ink; 4] = [Ink::Black, Ink::Cyan, Ink::Magenta, Ink::Yellow];
+
 impl Bridge {
     /// A bridge at a free place.
     pub fn start(rate: usize) -> Bridge {
@@ -17,7 +19,17 @@ impl Bridge {
     }
 
     pub fn at(address: SocketAddr, rate: usize) -> Bridge {
-        let port = Port::new(&[Ink::Black, Ink::Cyan, Ink::Magenta, Ink::Yellow], rate);
+        Bridge::with(address, Port::new(&INKS, rate))
+    }
+
+    /// A board whose diary says that its supply went in the middle of this job.
+    pub fn torn(address: SocketAddr, rate: usize, job: u32) -> Bridge {
+        let port = Port::new(&INKS, rate);
+        port.tear(job);
+        Bridge::with(address, port)
+    }
+
+    fn with(address: SocketAddr, port: Port) -> Bridge {
         let (served, address) = served::Bridge::on_tcp(address, port).unwrap();
         Bridge { address, served }
     }

@@ -538,8 +538,9 @@ fn a_sheet_lost_with_its_bridge_is_held_and_printed_again_only_when_released() {
     fs::write(&file, &bytes).unwrap();
     let job = server.print(&["-d", "Alps", "-o", "raw", file.to_str().unwrap()]);
     server.wait_for("some rows", |_| bridge.printed().len() > 20_000);
+    let lost = bridge.port.progress().unwrap().job;
     drop(bridge);
-    let bridge = Bridge::at(address, FAST);
+    let bridge = Bridge::torn(address, FAST, lost);
     server.wait_for("the job to be held", |server| server.job(job, "job-state") == "pending-held");
     assert!(bridge.printed().is_empty());
     // The next one is not sent to a printer that waits for the rest of a row.
