@@ -127,26 +127,28 @@ impl Table {
         self.0.iter().filter(|((which, ..), _)| *which == promise).map(|(_, count)| count).sum()
     }
 
-    /// Cells that were never reached and have no reason for it, and cells that were reached in spite of one.
+    /// Doors and states in which a promise was never endangered though it can be, and cells that were reached though they
+    /// cannot be. A single cell may be so rare that it is chance.
     pub fn gaps(&self) -> Vec<String> {
         let mut gaps = Vec::new();
+        let cells = || Door::ALL.into_iter().flat_map(|door| State::ALL.map(|state| (door, state)));
         for promise in Promise::ALL {
-            for door in Door::ALL {
-                for state in State::ALL {
-                    let count = self.count(promise, door, state);
-                    match cannot(promise, door, state) {
-                        None if count == 0 => {
-                            gaps.push(format!("{promise:?} by {door:?} in {state:?}: never"))
-                        }
-                        Some(why) if count > 0 => {
-                            gaps.push(format!(
-                                "{promise:?} by {door:?} in {state:?}: {count} times, though {why}"
-                            ));
-                        }
-                        _ => {}
-                    }
+            for (door, state) in cells() {
+                let count = self.count(promise, door, state);
+                if let Some(why) = cannot(promise, door, state).filter(|_| count > 0) {
+                    gaps.push(format!("{promise:?} by {door:?} in {state:?}: {count} times, though {why}"));
                 }
             }
+            let mut all = |name: String, of: &dyn Fn(Door, State) -> bool| {
+                let mut own = cells()
+                    .filter(|&(door, state)| of(door, state) && cannot(promise, door, state).is_none())
+                    .peekable();
+                if own.peek().is_some() && own.all(|(door, state)| self.count(promise, door, state) == 0) {
+                    gaps.push(format!("{promise:?} {name}: never"));
+                }
+            };
+            Door::ALL.into_iter().for_each(|one| all(format!("by {one:?}"), &|door, _| door == one));
+            State::ALL.into_iter().for_each(|one| all(format!("in {one:?}"), &|_, state| state == one));
         }
         gaps
     }
@@ -203,14 +205,14 @@ pub fn tried() -> String {
 pub fn cannot(promise: Promise, door: Door, state: State) -> Option<&'static str> {
     use Promise::*;
     match (promise, door, state) {
-        (NothingIntoAnotherSheet, _, State::AtRest | State::InSheet) => {
-            Some("the board would take a printer with a part of a sheet to have none, or its own")
+        (NothingIntoAnotherSheet, _, State::AtRest) => {
+            Some("the board would take a printer with a part of a sheet to have none")
         }
         (NothingIntoAnotherSheet, _, State::Down) => Some("nobody asks a board that is down"),
         (NothingTwice, Door::Plain | Door::Button | Door::Question, _) => {
             Some("such a job has no number of its own")
         }
-        (NothingTwice, _, State::Down) => Some("nobody asks a board that is down"),
+        (NothingTwice, Door::Stored, State::Down) => Some("its host prints it, which asks the board"),
         (PrintedIsAtThePrinter, Door::Plain | Door::Button | Door::Question, _) => {
             Some("nobody is told how such a job has ended")
         }

@@ -108,7 +108,8 @@ impl World {
         if let Some(known) = self.known.get_mut(&number) {
             known.cancelled = true;
         }
-        if self.printer.owner == number && self.printer.holds_a_part() {
+        // Jobs of operating systems share a number, so that the printer's part may be of an earlier one.
+        if self.printer.owner == number && self.printer.holds_a_part() && self.state() == State::InSheet {
             self.endanger(Promise::EndedSheetIsLegal, number);
         }
     }

@@ -55,9 +55,11 @@ fn the_wiring_is_tried_in_every_position_of_the_plug_and_never_on_a_printer() {
     let Some(mut bench) = Bench::new(&INKS.map(Cartridge::from)) else { return };
     // A printer in place of the plug: not a byte, and no reset.
     let with_printer = bench.run(&["bridge", "test", "--to", &bench.to()]);
-    assert!(!with_printer.status.success() && text(&with_printer).contains("no loop-back plug answers"));
+    let words = text(&with_printer);
+    assert!(!with_printer.status.success() && words.contains("no loop-back plug answers"), "{words}");
     let pattern = bench.run(&["bridge", "test", "--pattern", "--to", &bench.to()]);
-    assert!(!pattern.status.success() && text(&pattern).contains("take the cable off the printer"));
+    let words = text(&pattern);
+    assert!(!pattern.status.success() && words.contains("take the cable off the printer"), "{words}");
     assert_eq!((bench.printed(), bench.bridge.desk().refused.clone()), (0, None));
     for position in 1..=3 {
         bench.bridge.plug(position).unwrap();
