@@ -300,12 +300,14 @@ impl<'t> Query<'t> {
     ///
     /// Errors: [`QueryError::JobOpen`] while a job is open, beside those of every question.
     pub fn probe(&mut self, data: u8, control: u8, patience: Duration) -> Result<Lines, QueryError> {
-        let (number, open) = (self.next(), self.said.progress.job);
+        let number = self.next();
+        let open = Some(self.said.progress).filter(Progress::is_open).map(|progress| progress.job);
         let question = ToBridge::Probe { request: number, data, control };
         exchange(self.link, &mut self.reader, &[question], patience, &mut |heard| match heard {
             Heard::Lines(request, lines, _) if request == number => Some(Ok(lines)),
+            // Without a job the board has something of its own to do, such as a reset: it is asked again.
             Heard::Answer(request, Reply::NotNow) if request == number => {
-                Some(Err(QueryError::JobOpen(open)))
+                open.map(|open| Err(QueryError::JobOpen(open)))
             }
             Heard::Refused(Refusal::Unknown, _) => Some(Err(QueryError::TooOld)),
             _ => None,
@@ -386,7 +388,7 @@ impl<'t> Query<'t> {
             &[ToBridge::Bootloader],
             patience,
             &mut |heard| match heard {
-                Heard::Refused(Refusal::JobOpen, job) => Some(QueryError::JobOpen(job)),
+                Heard::Refused(Refusal::JobOpen, job) if job != 0 => Some(QueryError::JobOpen(job)),
                 _ => None,
             },
         );
