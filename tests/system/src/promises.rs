@@ -127,8 +127,8 @@ impl Table {
         self.0.iter().filter(|((which, ..), _)| *which == promise).map(|(_, count)| count).sum()
     }
 
-    /// Doors and states in which a promise was never endangered though it can be, and cells that were reached though
-    /// they cannot be. A single cell may be so rare that it is chance.
+    /// Doors and states in which a promise was never endangered though it can be, and cells that were reached
+    /// though they cannot be. A single cell may be so rare that it is chance.
     pub fn gaps(&self) -> Vec<String> {
         let mut gaps = Vec::new();
         let cells = || Door::ALL.into_iter().flat_map(|door| State::ALL.map(|state| (door, state)));
