@@ -140,10 +140,10 @@ impl Table {
                 }
             }
             let mut all = |name: String, of: &dyn Fn(Door, State) -> bool| {
-                let mut own = cells()
-                    .filter(|&(door, state)| of(door, state) && cannot(promise, door, state).is_none())
-                    .peekable();
-                if own.peek().is_some() && own.all(|(door, state)| self.count(promise, door, state) == 0) {
+                let own = cells()
+                    .filter(|&(door, state)| of(door, state) && cannot(promise, door, state).is_none());
+                let counts: Vec<u64> = own.map(|(door, state)| self.count(promise, door, state)).collect();
+                if !counts.is_empty() && counts.iter().all(|count| *count == 0) {
                     gaps.push(format!("{promise:?} {name}: never"));
                 }
             };
@@ -212,7 +212,7 @@ pub fn cannot(promise: Promise, door: Door, state: State) -> Option<&'static str
         (NothingTwice, Door::Plain | Door::Button | Door::Question, _) => {
             Some("such a job has no number of its own")
         }
-        (NothingTwice, Door::Stored, State::Down) => Some("its host prints it, which asks the board"),
+        (NothingTwice, Door::Stored, State::Down) => Some("its host asks the board, which is down"),
         (PrintedIsAtThePrinter, Door::Plain | Door::Button | Door::Question, _) => {
             Some("nobody is told how such a job has ended")
         }

@@ -305,11 +305,7 @@ impl Desk<'_> {
                 Some(Ok(JobState::Lost)) => return told(person.world, number, Outcome::Lost),
                 Some(Ok(JobState::None | JobState::Broken(_) | JobState::Cancelled))
                 | Some(Err(QueryError::NotStored(_) | QueryError::JobOpen(_))) => return,
-                // Who looks seldom is told while the printer is in a later sheet.
-                _ => {
-                    let seconds = 1 + person.said.borrow_mut().below(20) as u64;
-                    person.pause(Duration::from_secs(seconds));
-                }
+                _ => person.pause(Duration::from_secs(2)),
             }
         }
     }

@@ -388,7 +388,7 @@ impl<'t> Query<'t> {
             &[ToBridge::Bootloader],
             patience,
             &mut |heard| match heard {
-                Heard::Refused(Refusal::JobOpen, job) if job != 0 => Some(QueryError::JobOpen(job)),
+                Heard::Refused(Refusal::JobOpen, job) => Some(QueryError::JobOpen(job)),
                 _ => None,
             },
         );

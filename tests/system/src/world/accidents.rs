@@ -108,8 +108,9 @@ impl World {
         if let Some(known) = self.known.get_mut(&number) {
             known.cancelled = true;
         }
-        // Jobs of operating systems share a number, so that the printer's part may be of an earlier one.
-        if self.printer.owner == number && self.printer.holds_a_part() && self.state() == State::InSheet {
+        // Jobs without a number of their own share one, so that the printer's part may be of an earlier one.
+        let is_own = self.known.contains_key(&number) || self.state() == State::InSheet;
+        if is_own && self.printer.owner == number && self.printer.holds_a_part() {
             self.endanger(Promise::EndedSheetIsLegal, number);
         }
     }
