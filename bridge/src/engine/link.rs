@@ -1,7 +1,7 @@
 //! The conversation with the host, and with a plain printer interface.
 
 use super::job::{Cancel, Job, Marks, Phase, Way, positions};
-use super::{ALONE, Due, Engine, Identity, LEAST_MEMORY, LOCAL, Request, Task};
+use super::{ALONE, Assignment, Due, Engine, Identity, LEAST_MEMORY, LOCAL, Request, Task};
 use crate::standing::Standing;
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
@@ -284,6 +284,9 @@ impl Engine<'_> {
 
     /// A question that needs a negotiation with the printer, and so one that is known to stand between two jobs.
     fn negotiate(&mut self, request: u16, task: Task) {
+        if self.is_at(Assignment { task, request: Some(request) }) {
+            return;
+        }
         let answer = match self.standing {
             _ if !self.is_idle() => Answer::NotNow,
             _ if self.is_off() => Answer::Stopped(Fault::PowerOff),

@@ -157,7 +157,7 @@ impl Checkpoint {
 }
 
 /// A task, and the number of the host's question if it answers one.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 struct Assignment {
     task: Task,
     request: Option<u16>,
@@ -584,10 +584,16 @@ impl<'m> Engine<'m> {
 
     /// Assigns a task to the board; false if it has one already.
     fn assign(&mut self, task: Task, request: Option<u16>) -> bool {
-        let free = matches!(self.board, Board::Free);
-        if free {
-            self.board = Board::Assigned(Assignment { task, request });
+        let wanted = Assignment { task, request };
+        if matches!(self.board, Board::Free) {
+            self.board = Board::Assigned(wanted);
         }
-        free
+        self.is_at(wanted)
+    }
+
+    /// Whether the board has this very task: a question that the host repeats, since frames may be lost, is
+    /// answered once.
+    fn is_at(&self, wanted: Assignment) -> bool {
+        matches!(self.board, Board::Assigned(own) | Board::Working(own) if own == wanted)
     }
 }

@@ -111,6 +111,26 @@ fn the_log_is_given_when_asked_for_and_a_probe_only_between_jobs() {
     assert_eq!(said.text, [format!("{:?}", ToHost::Answer { request: 6, answer: Answer::NotNow })]);
 }
 
+/// A printer may take longer to answer than a host waits before it says its question again.
+#[test]
+fn a_question_that_is_said_again_while_the_printer_is_asked_is_answered_once() {
+    for (what, task) in [(Ask::Printer, Task::PrinterStatus), (Ask::DeviceId, Task::DeviceId)] {
+        let mut rig = Rig::new();
+        let question = ToBridge::Ask { request: 3, what };
+        assert_eq!(rig.tell(question).text, Vec::<String>::new());
+        assert_eq!(rig.tell(question).text, Vec::<String>::new());
+        assert_eq!(rig.engine.task(), Some(task));
+        assert_eq!(rig.tell(question).text, Vec::<String>::new());
+        // Another one finds the printer at work.
+        let other = rig.tell(ToBridge::Ask { request: 4, what });
+        assert_eq!(other.text, [format!("{:?}", ToHost::Answer { request: 4, answer: Answer::NotNow })]);
+        rig.engine.done(Outcome::Answer(Answer::Bytes(b"all is well")));
+        let answer = ToHost::Answer { request: 3, answer: Answer::Bytes(b"all is well") };
+        assert_eq!(rig.said().text, [format!("{answer:?}")]);
+        assert_eq!(rig.engine.task(), None);
+    }
+}
+
 #[test]
 fn a_question_is_answered_at_once_though_the_printer_takes_nothing() {
     let mut rig = Rig::new();

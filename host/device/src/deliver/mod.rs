@@ -264,7 +264,7 @@ impl Cartridges {
     /// Reads an answer, with the inks of the job.
     fn read(reply: Reply, inks: &[Ink]) -> Cartridges {
         match reply {
-            Reply::NotNow => Cartridges::Unknown("the bridge has an open job".into()),
+            Reply::NotNow => Cartridges::Unknown("the bridge is busy with the printer".into()),
             Reply::OneWay => Cartridges::Unknown("the printer's port is one-way".into()),
             Reply::Silent => Cartridges::Unknown("the printer did not answer".into()),
             Reply::Unsure => Cartridges::Unknown(

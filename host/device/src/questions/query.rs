@@ -276,15 +276,23 @@ impl<'t> Query<'t> {
         })
     }
 
-    /// Asks the printer for its status answer or its device ID.
+    /// Asks the printer for its status answer or its device ID. A bridge without an open job that has something of its own to do,
+    /// such as a reset, is asked again until `patience` ends.
     pub fn printer(&mut self, what: Ask, patience: Duration) -> Result<Reply, QueryError> {
-        let number = self.next();
-        // Asked once only: the bridge may be waiting for the printer, and a second question would wait behind.
-        let question = ToBridge::Ask { request: number, what };
-        exchange(self.link, &mut self.reader, &[question], patience, &mut |heard| match heard {
-            Heard::Answer(request, reply) if request == number => Some(reply),
-            _ => None,
-        })
+        let end = self.link.now() + patience;
+        loop {
+            let left = end.saturating_sub(self.link.now());
+            let number = self.next();
+            let question = ToBridge::Ask { request: number, what };
+            let reply = exchange(self.link, &mut self.reader, &[question], left, &mut |heard| match heard {
+                Heard::Answer(request, reply) if request == number => Some(reply),
+                _ => None,
+            })?;
+            let left = end.saturating_sub(self.link.now());
+            if reply != Reply::NotNow || left <= REPEAT || self.ask_progress(left)?.is_open() {
+                return Ok(reply);
+            }
+        }
     }
 
     /// What the printer says it is. Nothing if it cannot be asked now: one that takes no bytes is not, nor one at work.

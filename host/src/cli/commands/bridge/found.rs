@@ -116,11 +116,7 @@ impl Found {
         let mut found = Found::of_bridge(&mut query)?;
         found.device_id = found.printer(&mut query, Ask::DeviceId, quiet)?;
         found.status = found.printer(&mut query, Ask::Printer, quiet)?;
-        // A job may have ended meanwhile, between two of these answers.
         found.progress = query.ask_progress(PATIENCE)?;
-        if found.status == Reply::NotNow && !found.progress.is_open() {
-            found.status = found.printer(&mut query, Ask::Printer, quiet)?;
-        }
         found.standing = query.standing();
         Ok(found)
     }
@@ -189,6 +185,19 @@ impl Found {
         self.device_id.device_id()
     }
 
+    /// Why the printer has told nothing.
+    pub fn unanswered(&self, reply: &Reply) -> String {
+        match reply {
+            Reply::NotNow if self.progress.is_open() => "not asked, because a job is open".into(),
+            Reply::NotNow => "not asked, because the bridge is busy with it".into(),
+            Reply::Unsure => format!("not asked, because {}", unsure(self.standing.1)),
+            Reply::NotAsked => "not asked".into(),
+            Reply::OneWay => "its port is one-way, so it cannot be asked".into(),
+            Reply::Bytes(_) | Reply::Silent => "did not answer in time".into(),
+            Reply::Stopped(_) => "cannot be asked at the moment".into(),
+        }
+    }
+
     /// Writes it in words.
     pub fn write(&self, out: &mut impl std::io::Write) -> Result<()> {
         writeln!(out, "bridge {:016x}, firmware {}", self.bridge.serial, self.bridge.firmware)?;
@@ -219,12 +228,7 @@ impl Found {
                 Ok(status) => write!(out, "{status}")?,
                 Err(error) => writeln!(out, "{}", with_causes(&error))?,
             },
-            Reply::NotNow => writeln!(out, "printer: not asked, because a job is open")?,
-            Reply::NotAsked => writeln!(out, "printer: not asked")?,
-            Reply::Unsure => writeln!(out, "printer: not asked, because {}", unsure(self.standing.1))?,
-            Reply::OneWay => writeln!(out, "printer: its port is one-way, so it cannot be asked")?,
-            Reply::Silent => writeln!(out, "printer: did not answer in time")?,
-            Reply::Stopped(_) => writeln!(out, "printer: cannot be asked at the moment")?,
+            other => writeln!(out, "printer: {}", self.unanswered(other))?,
         }
         let Usage { fixed, stack, stack_used, longest_us } = self.usage;
         writeln!(

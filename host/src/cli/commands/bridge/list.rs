@@ -99,7 +99,7 @@ fn write(out: &mut impl std::io::Write, candidate: &Candidate, found: &Result<Fo
                 (Some(id), _) if is_alps(&id) => writeln!(out, "    printer: {id}")?,
                 (Some(id), _) => writeln!(out, "    printer: {id} (not an ALPS printer)")?,
                 (None, Some(fault)) => writeln!(out, "    {}", words::fault(fault, None))?,
-                (None, None) => writeln!(out, "    printer: does not identify itself")?,
+                (None, None) => writeln!(out, "    printer: {}", found.unanswered(&found.device_id))?,
             }
             if let Some(newer) = newer_firmware(&found.bridge) {
                 writeln!(out, "    {newer}")?;
