@@ -414,6 +414,10 @@ impl<'d> Session<'d> {
     fn convinced(&mut self, now: Duration) -> bool {
         if self.contradicted.is_none_or(|at| now.saturating_sub(at) >= REPEAT) {
             self.contradicted = Some(now);
+            if self.contradictions < CONVINCED {
+                // A list from before may be one from before the job's end.
+                self.recalled = false;
+            }
             self.contradictions = self.contradictions.saturating_add(1);
         }
         self.contradictions >= CONVINCED
@@ -533,5 +537,63 @@ fn push(message: &ToBridge<'_>, out: &mut Vec<u8>) {
     // Every message of ours fits a frame: pieces are at most DATA_MAX.
     if let Ok(length) = frame::write(message, &mut buffer) {
         out.extend_from_slice(&buffer[..length]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol::link::message::{JobKind, PAST};
+
+    fn said(message: &ToHost<'_>) -> Vec<u8> {
+        let mut buffer = [0; MAX];
+        let length = frame::write(message, &mut buffer).unwrap();
+        buffer[..length].to_vec()
+    }
+
+    /// A printed job, whose list of ended jobs is late, behind another job's progress.
+    #[test]
+    fn a_list_from_before_a_jobs_end_does_not_make_it_forgotten() {
+        let record = Record { phase: Phase::Sending, ..Record::new(7, JobKind::Raw, 3) };
+        let mut session = Session::new(record, b"abc");
+        session.connected(Duration::ZERO);
+        let other = Progress {
+            job: 8,
+            state: JobState::Printing,
+            accepted: 1,
+            limit: 1,
+            printed: 0,
+            pass: 0,
+            row: 0,
+        };
+        let mut past = [PastJob::NONE; PAST];
+        let hello = ToHost::Hello { version: VERSION, schema: SCHEMA, boot: 1, serial: 1, firmware: "0" };
+        session.hear(Duration::ZERO, &said(&hello)).unwrap();
+        session.hear(Duration::ZERO, &said(&ToHost::Past(past))).unwrap();
+        let mut now = Duration::ZERO;
+        for _ in 0..9 {
+            now += REPEAT;
+            session.hear(now, &said(&ToHost::Progress(other))).unwrap();
+            assert_eq!(session.outcome(), None);
+        }
+        past[0] = PastJob { job: 7, state: JobState::Done, printed: 3 };
+        session.hear(now, &said(&ToHost::Past(past))).unwrap();
+        assert_eq!(session.outcome(), Some(Outcome::Printed));
+    }
+
+    #[test]
+    fn a_job_that_is_on_no_later_list_either_is_forgotten() {
+        let record = Record { phase: Phase::Sending, ..Record::new(7, JobKind::Raw, 3) };
+        let mut session = Session::new(record, b"abc");
+        session.connected(Duration::ZERO);
+        let hello = ToHost::Hello { version: VERSION, schema: SCHEMA, boot: 1, serial: 1, firmware: "0" };
+        session.hear(Duration::ZERO, &said(&hello)).unwrap();
+        let none =
+            Progress { job: 0, state: JobState::None, accepted: 0, limit: 0, printed: 0, pass: 0, row: 0 };
+        for answer in 1..9 {
+            session.hear(answer * REPEAT, &said(&ToHost::Past([PastJob::NONE; PAST]))).unwrap();
+            session.hear(answer * REPEAT, &said(&ToHost::Progress(none))).unwrap();
+        }
+        assert_eq!(session.outcome(), Some(Outcome::Forgotten));
     }
 }
