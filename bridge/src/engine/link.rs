@@ -310,7 +310,7 @@ impl Engine<'_> {
         }
     }
 
-    /// Assigns a task. A board that has one refuses it as it would beside a job: the host may ask again later.
+    /// Assigns a task. A board that has another refuses it as it would beside a job: the host may ask again later.
     fn unless_busy(&mut self, task: Task, request: Option<u16>) {
         if !self.assign(task, request) {
             self.refuse(Refusal::JobOpen, self.job.as_ref().map_or(0, |job| job.id));

@@ -582,7 +582,7 @@ impl<'m> Engine<'m> {
         }
     }
 
-    /// Assigns a task to the board; false if it has one already.
+    /// Assigns a task to the board; false if it has another.
     fn assign(&mut self, task: Task, request: Option<u16>) -> bool {
         let wanted = Assignment { task, request };
         if matches!(self.board, Board::Free) {

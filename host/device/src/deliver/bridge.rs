@@ -72,7 +72,8 @@ impl Delivery<'_> {
         let mut link = self.caller.open(address, bridge)?;
         let mut query = Query::new(&mut *link, BRIDGE)?;
         if query.progress().is_open() {
-            self.caller.tell(&News::Printer(&Cartridges::read(Reply::NotNow, inks)));
+            let unknown = Cartridges::Unknown("the bridge has an open job".into());
+            self.caller.tell(&News::Printer(&unknown));
             return Ok(());
         }
         let fault = query.lines(BRIDGE)?.1;

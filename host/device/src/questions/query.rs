@@ -292,7 +292,18 @@ impl<'t> Query<'t> {
             if reply != Reply::NotNow || left <= REPEAT || self.ask_progress(left)?.is_open() {
                 return Ok(reply);
             }
+            self.rest(REPEAT)?;
         }
+    }
+
+    /// Waits for so long. What comes meanwhile answers nothing that is still asked.
+    fn rest(&mut self, time: Duration) -> Result<(), QueryError> {
+        let end = self.link.now() + time;
+        while self.link.now() < end {
+            let left = end.saturating_sub(self.link.now());
+            self.link.receive(&mut [0; 1024], left)?;
+        }
+        Ok(())
     }
 
     /// What the printer says it is. Nothing if it cannot be asked now: one that takes no bytes is not, nor one at work.
@@ -587,6 +598,92 @@ mod tests {
             let said = greets(&[hello]).unwrap_err();
             assert!(said.contains("speaks version") && said.contains("bridge flash"), "{said}");
         }
+    }
+
+    /// A bridge in its own time that is busy for the first few questions.
+    struct Busy {
+        now: Duration,
+        reader: Reader,
+        out: Vec<u8>,
+        busy: usize,
+        state: JobState,
+        asked: Vec<Duration>,
+    }
+
+    impl Transport for Busy {
+        fn send(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            let mut rest = bytes;
+            loop {
+                let (message, behind) = match self.reader.read(rest) {
+                    Read::More => return Ok(bytes.len()),
+                    Read::Damaged(_, behind) => {
+                        rest = behind;
+                        continue;
+                    }
+                    Read::Message(message, behind) => {
+                        (frame::decode::<ToBridge<'_>>(message).unwrap(), behind)
+                    }
+                };
+                rest = behind;
+                let progress = Progress { state: self.state, ..NOTHING };
+                let hello =
+                    ToHost::Hello { version: VERSION, schema: SCHEMA, boot: 1, serial: 1, firmware: "0" };
+                let standing = ToHost::Standing { standing: Standing::AT_REST, job: 0 };
+                let said = match message {
+                    ToBridge::Ask { request, .. } => {
+                        self.asked.push(self.now);
+                        let is_busy = self.asked.len() <= self.busy;
+                        let answer = if is_busy { Answer::NotNow } else { Answer::Bytes(b"well") };
+                        vec![ToHost::Answer { request, answer }]
+                    }
+                    _ => vec![hello, ToHost::Past(NO_PAST), ToHost::Progress(progress), standing],
+                };
+                for message in said {
+                    let mut room = [0; MAX];
+                    let length = frame::write(&message, &mut room).unwrap();
+                    self.out.extend_from_slice(&room[..length]);
+                }
+            }
+        }
+
+        fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
+            if self.out.is_empty() {
+                self.now += patience;
+            }
+            let count = self.out.len().min(buffer.len());
+            buffer[..count].copy_from_slice(&self.out[..count]);
+            self.out.drain(..count);
+            Ok(count)
+        }
+
+        fn now(&self) -> Duration {
+            self.now
+        }
+    }
+
+    #[test]
+    fn a_bridge_that_is_busy_without_a_job_is_asked_again_and_not_too_often() {
+        let ask = |busy, state| {
+            let mut link = Busy {
+                now: Duration::ZERO,
+                reader: Reader::new(),
+                out: Vec::new(),
+                busy,
+                state,
+                asked: Vec::new(),
+            };
+            let mut query = Query::new(&mut link, Duration::from_secs(1)).unwrap();
+            let reply = query.printer(Ask::Printer, Duration::from_secs(3)).unwrap();
+            (reply, link.asked)
+        };
+        let (reply, asked) = ask(3, JobState::None);
+        assert_eq!((reply, asked.len()), (Reply::Bytes(b"well".to_vec()), 4));
+        assert!(asked.windows(2).all(|two| two[1] - two[0] >= REPEAT), "{asked:?}");
+        // It stays busy, and so does one that prints, which is not asked again.
+        let (reply, asked) = ask(usize::MAX, JobState::None);
+        assert!(reply == Reply::NotNow && asked.len() <= 8, "{asked:?}");
+        let (reply, asked) = ask(usize::MAX, JobState::Printing);
+        assert_eq!((reply, asked.len()), (Reply::NotNow, 1));
     }
 
     #[test]

@@ -72,7 +72,7 @@ pub(crate) fn await_sheet(
     loop {
         let (busy, said) = match query.printer(Ask::Printer, PRINTER_PATIENCE)? {
             Reply::OneWay => return Ok(unknown("the printer's port is one-way")),
-            Reply::NotNow => return Ok(unknown("the bridge already has another job")),
+            Reply::NotNow => return Ok(unknown("the bridge is busy with another job or question")),
             Reply::Unsure | Reply::NotAsked => {
                 return Ok(unknown(
                     "the printer was switched off, its cable was pulled, or the bridge has restarted, which does not know what it is doing",

@@ -193,7 +193,8 @@ impl Found {
             Reply::Unsure => format!("not asked, because {}", unsure(self.standing.1)),
             Reply::NotAsked => "not asked".into(),
             Reply::OneWay => "its port is one-way, so it cannot be asked".into(),
-            Reply::Bytes(_) | Reply::Silent => "did not answer in time".into(),
+            Reply::Bytes(_) => "its answer cannot be read".into(),
+            Reply::Silent => "did not answer in time".into(),
             Reply::Stopped(_) => "cannot be asked at the moment".into(),
         }
     }
